@@ -1,4 +1,4 @@
-"""Tools at every opening: how their fingers move, and the proof that their hulls hold them."""
+"""Grippers at every opening: motion of the fingers, and the proof of containment in their hulls."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ OPEN = 0.085
 OPENING = 2e-3
 # m: the pads touch when closed, but for the last thousandths of a radian
 CLOSED = 5e-4
-# the greatest sagitta is that of the farthest corner, by the first term of its series
+# the greatest sagitta belongs to the farthest corner, by the first term of its series
 SERIES = 1e-3
 
 
@@ -62,7 +62,7 @@ def test_the_pads_of_the_robotiq_touch_when_closed_and_open_by_its_stroke() -> N
 
 
 def test_arcs_stay_within_the_sagitta_of_their_chords() -> None:
-    """A corner on a turning link, and one of a finger that the link carries without a turn."""
+    """A corner on a turning link, and a corner of a finger carried by the link without turning."""
     corners = np.array([[[0.0, 0.03, 0.04], [0.1, 0.0, 0.02], [0.0, 0.01, 0.0]]])
     hinge = Joint(pin.SE3.Identity(), turn=1.0)
     carried = Joint(pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.06])), turn=-1.0)
@@ -88,7 +88,7 @@ def test_a_triangle_is_not_held_where_no_cover_holds_its_whole_way() -> None:
 
 
 def test_the_hulls_of_overlapping_cells_hold_a_piece() -> None:
-    """A cube of 2 cm, in two cells that overlap by 0.1 mm, and in two that leave a gap."""
+    """A 2 cm cube in two cells that overlap by 0.1 mm, and in two cells with a gap."""
     cube = Piece((), box=(0.02, 0.02, 0.02)).triangles(meshes(ROBOTIQ))
     for begin, held in ((-1e-4, True), (1e-3, False)):
         low = FARTHEST[0], (1.0, 1.0, 0.0)
@@ -106,8 +106,8 @@ def test_only_points_below_the_face_of_the_flange_are_on_it() -> None:
 
 @pytest.mark.parametrize("every", long_but([7], [1, 7]))
 def test_the_hulls_of_the_robotiq_hold_it_at_every_opening_and_in_between(every: int) -> None:
-    """Those of a part hold its pieces at every so many openings, and between each of them and the
-    next one; 1 mm less, and every one leaves something out."""
+    """The hulls of a part contain its pieces at sampled openings and between neighbouring samples;
+    shrunk by 1 mm, every hull misses a point."""
     tool, folder, rest = TOOL_MESHES[ROBOTIQ], meshes(ROBOTIQ), hulls(ROBOTIQ)
     sagitta = tool.sagitta(folder)
     for part in tool.parts:

@@ -1,4 +1,4 @@
-"""What every answer of `optimize` promises, and the conditions under which it is asked for."""
+"""Promises of every answer of `optimize`, and the conditions of the requests."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from tests.optimizer.moves import (
 )
 
 ROUNDING = 1e-9
-# relative; what a solver that stops where a step promises 5e-5 of the cost may leave behind, twice
+# relative; twice the remaining error of a solver that stops at predicted gains of 5e-5 of the cost
 CONVERGED = 1e-3
 BALANCE = 1e-3  # of the total: the identity of energy that is promised
-# relative; the two energies are sums over panels of their own, with corners of |x| inside (see
-# QUADRATURE in test_baselines); a motion that is its own baseline differs by 1e-5 from itself
+# relative; the two energies are sums over different panels, with corners of |x| inside (see
+# QUADRATURE in test_baselines); a motion equal to its own baseline differs by 1e-5 from itself
 NOT_BEATEN = 5e-5
 SYMMETRY = (
     2e-3  # relative; two runs whose optima are mirror images, reached along ways that are not
@@ -36,7 +36,7 @@ SYMMETRY = (
 
 
 def total(solution: Solution, task: Problem) -> float:
-    """The energy that was minimised [J]."""
+    """The minimised energy [J]."""
     return solution.energy.of(task.objective)
 
 
@@ -45,7 +45,9 @@ def shortest(start: Array = START, goal: Array = GOAL, **given: Any) -> float:
 
 
 def assert_true(solution: Solution, task: Problem) -> None:
-    """All that every answer promises, recomputed where that is not the certificate's own work."""
+    """Asserts all promises of an answer, recomputed unless the certificate's own work is the
+    promise.
+    """
     assert solution.certificate.valid
     electrical, own = solution.energy.electrical, total(solution, task)
     assert electrical.parts_sum == pytest.approx(electrical.total, rel=BALANCE)

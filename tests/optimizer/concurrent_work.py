@@ -1,5 +1,4 @@
-"""Fifty pieces of work of every kind that the library does, and fingerprints of their results, bit
-for bit.
+"""Fifty calls of every kind of the library, and bitwise fingerprints of their results.
 
 The clock stands still: no deadline passes, however busy the machine is.
 """
@@ -62,7 +61,7 @@ from tests.optimizer.moves import (
     tcp_pose,
 )
 
-# the only figure of an answer that is measured, not computed
+# the only measured figure of an answer
 MEASURED = {"wall_time"}
 DOWN = Rotation.from_euler("x", np.pi).as_rotvec()
 HOLDER = capsule_between(np.zeros(3), np.array([0, 0, 0.1]), 0.03)
@@ -71,19 +70,19 @@ FLOOR: Shape = HalfSpace()
 
 @dataclass(frozen=True)
 class Work:
-    """A call whose result must not depend on other threads."""
+    """A call with a result that must not depend on other threads."""
 
     name: str
     run: Callable[[], object]
 
 
 def still() -> float:
-    """A clock on which no time passes."""
+    """A clock without any passing time."""
     return 0.0
 
 
 def fingerprint(value: Any) -> object:
-    """Nested tuples that are equal only if the values are equal bit for bit."""
+    """Nested tuples, equal only if the values are bitwise equal."""
     if isinstance(value, np.ndarray):
         return value.shape, value.dtype.str, value.tobytes()
     if isinstance(value, float | np.floating):
@@ -114,7 +113,7 @@ def solved(asked: Problem) -> object:
 
 
 def behind_a_post(height: float = 0.5) -> Problem:
-    """A goal on the other side of a post, so that paths around it are planned."""
+    """A goal on the other side of a post: the answer needs path planning."""
     scene = Scene(
         [
             Obstacle("floor", FLOOR, at([0, 0, -0.02]), 0.01),
@@ -156,7 +155,7 @@ def replayed_log(arm: Arm) -> object:
 
 
 def inverse(seed: int) -> object:
-    """Every solution of some poses, and the nearest pair of bodies at each."""
+    """All solutions of some poses, and the nearest pair of bodies at every solution."""
     arm, found = arm_in_cell(), []
     for q in np.random.default_rng(seed).uniform(-np.pi, np.pi, (10, 6)):
         solutions = inverse_kinematics_for(ROBOT).solve(tcp_pose(q).T)
@@ -217,7 +216,7 @@ def moves() -> list[Work]:
 
 
 def targets() -> list[Work]:
-    """Poses, sets of targets, poses with an orientation tolerance, and what cannot be solved."""
+    """Poses, sets of targets, poses with an orientation tolerance, and unsolvable requests."""
     pose, other = tcp_pose(GOAL), tcp_pose(GOAL + 0.2)
     cone = ConeOrientedPose(pose.T[:3, 3], np.array([0.0, 0.0, 1.0]), pose.T[:3, 2], 0.3)
     unreachable = replace(pose, T=at([3.0, 0.0, 0.5]))
@@ -288,5 +287,5 @@ def other_work() -> list[Work]:
 
 
 def all_work() -> list[Work]:
-    """Fifty of them."""
+    """All fifty calls."""
     return [*moves(), *targets(), *surroundings(), *other_work()]

@@ -1,4 +1,4 @@
-"""The certificate of hand-made splines: what it must confirm, and what it must not let pass."""
+"""The certificate of hand-made splines: correct ones are confirmed, violations never pass."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ ROUNDING = 1e-9
 # relative; a peak h/2 from the nearest of the grid's samples is missed by (h/2)² · |x''| / 2|x|:
 # for the quintic's acceleration 18 (h / 2T)², 4.5e-6 at 1 ms in 1 s
 GRID_MISS = 5e-6
-# relative; the torque between two samples, by which the certificate's bound may be above the
-# greatest sample
+# relative; excess of the certificate's bound between two torque samples over the greatest sample
 BETWEEN = 5e-5
 # relative; Simpson on 1 ms against Gauss on other panels, both with corners of |x| inside intervals
 QUADRATURE = 1e-5
@@ -118,7 +117,7 @@ def test_torques_agree_with_another_route(friction: str) -> None:
     """M a + h with the payload, tilted gravity and rotor inertia, plus friction, over the same
     millisecond grid.
 
-    In half a second, so that the peak is in motion, where friction counts.
+    The motion takes half a second, so the peak occurs at speed, with friction.
     """
     task = problem(friction=friction)
     q, v, a = samples(START, GOAL, np.linspace(0.0, 0.5, 501), 0.5)
@@ -142,7 +141,7 @@ def test_torques_agree_with_another_route(friction: str) -> None:
 def test_a_broken_limit_shows_its_ratio(
     energy: Energy, name: str, field: str, tolerance: float
 ) -> None:
-    """With the last joint's limit at its peak over 1.25 that limit, and no other, reads 1.25."""
+    """With the last joint's limit at 1 / 1.25 of its peak, only this limit's ratio reads 1.25."""
     q, v, a = samples(START, GOAL, np.linspace(0.0, 1.0, 1001), 1.0)
     tau_motor = by_crba(problem(), q, v, a) + ROBOT.friction.torque(v)
     peak = {
@@ -208,7 +207,7 @@ def test_a_missed_goal_shows(energy: Energy) -> None:
 
 
 def test_a_full_turn_is_not_the_same_goal(energy: Energy) -> None:
-    """Forward kinematics cannot tell them apart, the caller's cables can."""
+    """Forward kinematics cannot distinguish them, but the user's cables can."""
     turned = GOAL.copy()
     turned[5] += 2 * math.pi
     certificate = certify(problem(), quintic(goal=turned), START, turned, energy)
@@ -252,7 +251,7 @@ def test_ends_that_are_not_at_rest_show(energy: Energy) -> None:
 
 @pytest.mark.parametrize("kind", ["electrical", "mechanical"])
 def test_an_energy_misreported_shows(energy: Energy, kind: str) -> None:
-    """One hundredth too little reported: the error is relative to what is reported."""
+    """One hundredth less is reported: the error is relative to the reported energy."""
     part = getattr(energy, kind)
     wrong = replace(energy, **{kind: replace(part, total=part.total / 1.01)})
     certificate = certify(problem(), quintic(), START, GOAL, wrong)
@@ -285,8 +284,8 @@ def test_short_motions_get_a_fine_grid(energy: Energy) -> None:
 
 @pytest.mark.parametrize("broken", ["control_points", "knots"])
 def test_nothing_undefined_passes(energy: Energy, broken: str) -> None:
-    """NaN in a control point, or a spline that does not begin at zero, compares false with every
-    tolerance.
+    """NaN in a control point, or a spline with a first knot other than zero, compares false with
+    every tolerance.
     """
     spline = quintic()
     if broken == "control_points":

@@ -1,4 +1,4 @@
-"""Durations that are given, chosen or impossible; deadlines; and what else cannot be done."""
+"""Given, free and impossible durations; deadlines; and other requests without a solution."""
 
 from __future__ import annotations
 
@@ -53,7 +53,9 @@ def test_fixed_durations_are_kept_exactly(objective: str, duration: float, metho
 
 @pytest.mark.parametrize("method", ["bspline", "time_scaling"])
 def test_duration_bounds_are_kept(method: str) -> None:
-    """To the last digit, where the best duration lies outside them; inside, they change nothing."""
+    """Kept to the last digit if the best duration lies outside the bounds; otherwise they change
+    nothing.
+    """
     best = solved(problem(method=method)).duration
     slow = solved(problem(method=method, duration_min=1.3 * best)).duration
     assert 1.3 * best <= slow < 1.3 * best * (1 + CONVERGED)
@@ -66,9 +68,7 @@ def test_duration_bounds_are_kept(method: str) -> None:
 
 
 def test_the_shortest_duration_is_nearly_the_seven_segments() -> None:
-    """Where torque is ample, the arm can be told to be as fast as its slowest joint, or hardly
-    slower.
-    """
+    """With ample torque, the arm is as fast as its slowest joint, or slightly slower."""
     for start, goal in random_moves(43, 4):
         least = shortest(start, goal)
         with pytest.raises(DurationTooShort) as refusal:
@@ -85,8 +85,8 @@ def test_no_time_at_all_is_a_deadline_exceeded() -> None:
 
 
 def test_little_time_gives_the_best_found_so_far() -> None:
-    """A search that would take many seconds, cut off: certified, feasible, told which candidates it
-    did not reach.
+    """A search of many seconds, cut off: certified and feasible, with the list of unexamined
+    candidates.
     """
     task = problem(
         start=tcp_pose(START), goal=tcp_pose(GOAL), objective="mechanical", duration_max=2.5
@@ -102,7 +102,7 @@ def test_little_time_gives_the_best_found_so_far() -> None:
 
 
 def test_a_load_that_cannot_be_held_is_told() -> None:
-    """The shoulder, what it needs to hold the arm stretched out, and what it has."""
+    """The error states the shoulder's torque for holding the stretched arm, and its limit."""
     stretched = np.array([0.0, 0.0, 0.0, 0.0, -1.57, 0.0])
     needed = np.abs(
         torques(problem(payload=Payload(5.0)), stretched[None], np.zeros((1, 6)), np.zeros((1, 6)))
@@ -127,8 +127,8 @@ def test_a_payload_beyond_the_rating_is_refused() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("refused", ["all", "the first"])
 def test_nothing_uncertified_is_returned(monkeypatch: pytest.MonkeyPatch, refused: str) -> None:
-    """A motion that its certificate does not confirm is not the answer; what it had ruled out may
-    be.
+    """An uncertified motion is never the answer; a candidate pruned because of it may become the
+    answer.
     """
     judged = []
 

@@ -1,6 +1,4 @@
-"""What physics says of the least energy: symmetries, and which way it changes with load, limits and
-friction.
-"""
+"""Physics of the least energy: symmetries, and its change with load, limits and friction."""
 
 from __future__ import annotations
 
@@ -32,10 +30,10 @@ from tests.selection import long_but
     ids=["alone", "loaded"],
 )
 def test_without_gravity_the_way_back_costs_the_same(given: dict[str, Any]) -> None:
-    """Run backwards, speeds change sign, torques too as friction is odd: but braking and driving
-    change places.
+    """In the reversed motion, speeds and, as friction is odd, torques change sign: braking and
+    driving change places.
 
-    So electrical energies differ, though losses at equal speeds do not; mechanical ones, with
+    So electrical energies differ despite equal losses at equal speeds; mechanical ones, with
     |power|, are the same.
     """
     least = shortest()
@@ -100,8 +98,7 @@ def test_a_point_on_the_last_axis_does_not_feel_the_last_joint() -> None:
     nothing.
     """
     disc = Payload(mass=2.0, com=np.array([0, 0, 0.1]), inertia=np.diag([0.004, 0.004, 0.006]))
-    # the last link's own mass lies on its axis but for 2.6 cm² of asymmetry, which is nothing to
-    # the arm
+    # the last link's mass lies on its axis except for 2.6 cm² of asymmetry, negligible for the arm
     turn = 2.0 * np.eye(6)[5]
     here, there = (
         solved(problem(payload=disc)),
@@ -119,8 +116,8 @@ def test_a_point_on_the_last_axis_does_not_feel_the_last_joint() -> None:
 
 
 def test_lifting_costs_more_than_lowering() -> None:
-    """By a good part of twice the change of potential energy, which is lent on the way up and
-    mostly burnt down.
+    """The difference is a good part of twice the change of potential energy: the ascent stores it,
+    and the descent mostly burns it.
     """
     high, low = (
         np.array([0.0, -1.6, 0.9, -1.0, -1.57, 0.0]),
@@ -136,8 +133,8 @@ def test_lifting_costs_more_than_lowering() -> None:
 
 @pytest.mark.parametrize("duration", long_but([1.6], [None, 1.6]))
 def test_relaxing_limits_never_costs_energy(duration: float | None) -> None:
-    """Tighter by a quarter at a time, of each kind: the energy does not fall, and the bound holds
-    at every step.
+    """Limits of every kind tighten in steps of a quarter: the energy does not fall, and the bound
+    holds at every step.
     """
     durations = fixed(duration) if duration else {}
     own = ROBOT.limits
@@ -152,9 +149,7 @@ def test_relaxing_limits_never_costs_energy(duration: float | None) -> None:
 
 
 def test_friction_laws_are_told_apart() -> None:
-    """Plain and curved friction have different coefficients; the answer is of the law that was
-    asked for.
-    """
+    """Plain and curved friction have different coefficients; the answer uses the requested law."""
     assert next(iter(ROBOT.friction_laws)) == "curved"
     for law in ROBOT.friction_laws:
         solution = solved(problem(friction=law))

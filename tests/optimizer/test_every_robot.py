@@ -1,6 +1,4 @@
-"""What holds for one robot holds for every robot that comes with the library: poses, dynamics,
-answers, proofs.
-"""
+"""Properties of every robot of the library: poses, dynamics, answers, proofs."""
 
 from __future__ import annotations
 
@@ -15,15 +13,15 @@ from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from tests.by_pinocchio import flange, torques_of
 from tests.selection import long_but
 
-# m and rad: what an answer may miss its pose by, and a configuration itself
+# m and rad: allowed error of an answer's pose, and of a configuration
 ACCURACY = 1e-9
 FOUND = 1e-6
 # N·m; both recursions round at about 1e-13 of torques of some 500 N·m
 TORQUE = 1e-9
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
-# share of configurations, drawn at random, in which capsules of links meet: more would mean that
-# they are too large
+# largest share of random configurations with contact between links: more would mean oversized
+# capsules
 OFTEN = 0.6
 # folded over the table as an arm is put to work, stretched out, and upright
 EVERYDAY: dict[int | str, tuple[list[float], ...]] = {
@@ -31,7 +29,7 @@ EVERYDAY: dict[int | str, tuple[list[float], ...]] = {
     "xarm7": ([0.0, -0.5, 0.0, 1.0, 0.0, 1.5, 0.0], [0.0] * 7, [0.0, 0.5, 0.0, 1.2, 0.0, 0.8, 0.0]),
     7: ([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785], [0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0]),
 }
-# the robot that every run tries, which has no figures of drives of its own
+# the robot of every test run, without its own figures of the drives
 QUICK = ("ur3e",)
 
 
@@ -92,10 +90,10 @@ def test_links_keep_apart_where_arms_are_used(name: str) -> None:
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("count", long_but((4,), (4, 200)))
 def test_poses_are_answered_with_a_proof(robot: Robot, count: int) -> None:
-    """From a random configuration to the pose of another, neither of which makes links meet."""
+    """From a random configuration to the pose of another one, both free of collisions."""
     rng, limits = np.random.default_rng(34), robot.limits
     model = collision_model(Arm(robot=robot))
-    # of a redundant arm each takes some seconds
+    # each answer of a redundant arm takes some seconds
     for _ in range(count if robot.nq == 6 else -(-count // 10)):
         ends = []
         while len(ends) < 2:
@@ -105,15 +103,13 @@ def test_poses_are_answered_with_a_proof(robot: Robot, count: int) -> None:
         start, goal = ends
         pose = Pose(flange(robot, goal))
         answer = optimize(Problem(arm=Arm(robot=robot), start=start, goal=pose, deadline=AMPLE))
-        # of a pose that is held on curves, samples are solved: whether other members are better is
-        # not proven
+        # configurations of a pose on curves are sampled: nothing is proven about other members
         assert (
             answer.status == ("optimal" if robot.nq == 6 else "feasible")
             and answer.certificate.valid
         )
         energy = answer.energy.electrical
         assert 0 <= answer.lower_bound <= energy.total
-        # zero is all that is known where the weight of a coming down arm may pay for the motion,
-        # and nowhere else
+        # zero is the only proven bound if the weight of a descending arm may pay for the motion
         assert answer.lower_bound > 0 or energy.potential < 0
         assert np.abs(flange(robot, answer.goal.q) - pose.T).max() < ACCURACY

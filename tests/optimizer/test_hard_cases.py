@@ -1,4 +1,4 @@
-"""Requests that once failed, each under the name of what was hard about it."""
+"""Requests that once failed, named by their difficulty."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from tests.by_pinocchio import flange
 from tests.optimizer.moves import ROBOT, problem_with
 from tests.selection import long_but
 
-# of a baseline's energy against ours where it is the answer itself: both are quadratures, and where
-# switches of two joints fall within microseconds, the spline that stands for the motion is slower
-# by that hair
+# of the energy of a baseline equal to the answer: both are quadratures, and the spline in place of
+# the motion is slower by this share if switches of two joints fall within microseconds
 HAIR = 3e-4
 
 
@@ -60,7 +59,7 @@ def varied(seed: int, index: int) -> Problem:
         options["windings"] = False
     start = q_start if rng.random() < 0.6 else pose(q_start)
     goal = pose(q_goal) if rng.random() < 0.8 else q_goal
-    # drawn without regard to what the arm could hit
+    # drawn without regard to collisions
     return problem_with(
         start=start,
         goal=goal,

@@ -1,6 +1,4 @@
-"""Friction that grows with the torque that a joint carries: one law in every place that looks at
-it.
-"""
+"""Friction that grows with a joint's load torque follows one law in all modules."""
 
 from __future__ import annotations
 
@@ -34,7 +32,7 @@ HEAVY = Payload(mass=5.0, com=np.array([0.0, 0.05, 0.1]))
 
 
 def loaded(robot: Robot = ROBOT, load: Any = LOAD, **given: Any) -> Robot:
-    """The robot with laws whose friction grows with the load."""
+    """The robot with friction laws that grow with the load."""
     share = np.broadcast_to(np.asarray(load, dtype=float), robot.nq)
     return replace(
         robot,
@@ -72,7 +70,7 @@ def test_the_law_takes_what_the_links_ask_for() -> None:
 
 
 def test_a_load_of_zero_is_no_load() -> None:
-    """To the bit, in the report and in the kernel that has the term."""
+    """Bitwise, in the report and in the kernel with the term."""
     y, none = states(22), problem(payload=PAYLOAD)
     zero = problem(payload=PAYLOAD, robot=loaded(load=0.0))
     q, v, a = y[:, :6], y[:, 6:12], y[:, 12:]
@@ -154,8 +152,8 @@ def test_an_answer_holds_whoever_looks_at_it(method: Any) -> None:
         task.arm, Recording([RecordedRows(path.t, path.q, path.v, path.a)])
     ).total.energy
     assert replayed.electrical.total == pytest.approx(electrical.total, rel=2e-3)  # of samples
-    # the same motion of an arm without that friction needs less, and the certificate tells the two
-    # apart
+    # an arm without load friction needs less for the same motion, and the certificate distinguishes
+    # the two
     dry = problem(payload=HEAVY, method=method)
     assert path.spline is not None
     assert (
@@ -165,7 +163,9 @@ def test_an_answer_holds_whoever_looks_at_it(method: Any) -> None:
 
 
 def test_friction_that_is_known_saves() -> None:
-    """The optimum of the law is better under the law than the optimum that does not know of it."""
+    """Under the law with load friction, its own optimum is better than the optimum of the plain
+    law.
+    """
     heavy = {"payload": HEAVY, "robot": loaded(load=0.2)}
     ours, blind = optimize(problem(**heavy)), optimize(problem(payload=HEAVY))
     assert blind.trajectory.spline is not None
@@ -174,8 +174,8 @@ def test_friction_that_is_known_saves() -> None:
 
 
 def test_no_torque_within_the_limits_is_beyond_the_relaxed_one() -> None:
-    """Friction helps to hold a load back: states whose motor torque is within the limit, at any
-    share below one.
+    """Friction helps to hold a load: the states have motor torques within the limit, for any share
+    below one.
     """
     rng = np.random.default_rng(5)
     for load in (0.0, 0.05, 0.2, 0.9):

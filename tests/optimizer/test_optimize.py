@@ -1,5 +1,5 @@
-"""The one door: whatever comes out of it is certified, true to its own figures, and no worse than
-what others do.
+"""Every answer of `optimize` is certified, consistent with its own figures, and no worse than the
+baselines.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ from tests.selection import long_but
     ),
 )
 def test_answers_are_true(name: str, method: str) -> None:
-    """Electrical energy with free duration, over conditions, of three moves of which one is
-    short."""
+    """Electrical energy with free duration, for three moves, including a short one, under several
+    conditions."""
     for k, (start, goal) in enumerate(random_moves(41, 4)):
         if method == "bspline" or k != 1:
             task = problem(start, goal, method=method, **CONDITIONS[name])
@@ -83,8 +83,8 @@ SHORT: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("name", long_but(("electrical",), SHORT))
 def test_short_moves_are_not_beaten(name: str) -> None:
-    """Of a milliradian to some hundredths: so slow that friction's reversal, which is smoothed, is
-    all of the way.
+    """Moves of a milliradian to some hundredths: so slow that smoothed friction reversal covers all
+    of the way.
     """
     rng = np.random.default_rng(44)
     for size in (1e-3, 3e-3, 1e-2, 3e-2):
@@ -134,8 +134,8 @@ def test_the_trajectory_is_that_of_the_spline() -> None:
     "given", [{}, fixed(2.0), {"method": "time_scaling"}, {"goal": tcp_pose(START)}], ids=str
 )
 def test_going_nowhere(given: dict[str, Any]) -> None:
-    """Start and goal are the same: a motion that idles, holds itself up, and costs no more than
-    staying put does.
+    """With equal start and goal, the motion idles, holds the arm, and needs no more energy than
+    staying put.
     """
     task = problem(**{"goal": START} | given)
     solution = solved(task)
@@ -148,7 +148,7 @@ def test_going_nowhere(given: dict[str, Any]) -> None:
 
 
 def test_full_turns_are_made_where_only_they_lead_there() -> None:
-    """A goal a full turn of the last joint away is not where the arm already is."""
+    """A goal a full turn of the last joint away differs from the start."""
     solution = solved(problem(goal=START - 2 * math.pi * np.eye(6)[5]))
     assert np.abs(solution.trajectory.q[:, 5] - START[5]).max() == pytest.approx(
         2 * math.pi, rel=1e-6
@@ -157,7 +157,7 @@ def test_full_turns_are_made_where_only_they_lead_there() -> None:
 
 
 def test_windings_can_be_left_out() -> None:
-    """Eight branches instead of all their turns; the best of them is no better than with all."""
+    """Eight branches without their turns: the best one is no better than with all turns."""
     all_of_them = solved(problem(goal=tcp_pose(GOAL)))
     few = solved(problem(goal=tcp_pose(GOAL), windings=False))
     assert len(few.candidates) == 8 < len(all_of_them.candidates)
@@ -182,8 +182,8 @@ def test_the_branch_asked_for_is_taken() -> None:
 
 
 def test_pose_and_joints_agree() -> None:
-    """A pose's answer is that of the joints it chose; joints that were given are never beaten by
-    fewer choices.
+    """The answer to a pose equals the answer to its chosen joints, and needs no more energy than
+    given joints with the same pose.
     """
     by_pose = solved(problem(goal=tcp_pose(GOAL), payload=PAYLOAD))
     by_joints = solved(problem(goal=by_pose.goal.q, payload=PAYLOAD))
@@ -212,8 +212,8 @@ def test_a_tool_moves_the_goal_but_not_the_motion() -> None:
 
 @pytest.mark.parametrize("number", range(1, 16))
 def test_the_papers_poses_are_answered(number: int) -> None:
-    """From its home to each pose of its Table 1: all are within reach, and each answer reaches the
-    pose.
+    """From home to the poses of the paper's Table 1: all are within reach, and every answer attains
+    its pose.
     """
     task = problem(HOME, paper_poses()[number - 1])
     try:

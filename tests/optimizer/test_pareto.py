@@ -1,5 +1,5 @@
-"""The front of energy over duration: not beaten by fresh answers, by itself, or by what lies
-between its points.
+"""The front of energy over duration is dominated neither by fresh solves, nor by its own points,
+nor by motions of durations between its points.
 """
 
 from __future__ import annotations
@@ -39,20 +39,18 @@ HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 # both are local optima, found from several guesses: of neighbouring durations' answers, about 2e-4
 # is scatter
 LOCAL = 1e-3
-# of the least duration: two runs stop at the same motion or at one that differs by the solver's
-# tolerance
+# of the least duration: two runs stop at motions within the solver's tolerance of one another
 SAME = 1e-6
 # of the same search, run twice
 ROUNDING = 1e-12
-# of the energy: what a jump lowers it to at most; of the duration: how near it is looked at from
-# below
+# of the energy: largest share left after a jump; of the duration: distance of the check below it
 JUMP = 0.9
 NEAR = 2e-3
 POINTS = 6
 
 
 def joints() -> Problem:
-    """A payload set down, which haste makes dearer."""
+    """A payload set down: a faster motion needs more energy."""
     return problem(HOME, HOME + np.array([0.5, -1.0, 1.0, 0.5, 0.5, 0.5]), payload=PAYLOAD)
 
 
@@ -102,8 +100,8 @@ def test_dropped_ones_are_beaten_or_not_found(asked_and_found: tuple[Problem, Fr
     for each in front.dropped:
         assert each.reason
         if "same least energy" in each.reason:
-            # what `optimize` answers is the last point, also where another duration's solve stops a
-            # little below
+            # the last point is the answer of `optimize`, even if the solve of another duration
+            # stops slightly lower
             least = objective(asked, front.points[-1])
             assert (
                 each.energy is not None and least * (1 - PARETO.same_energy) <= each.energy <= least
@@ -152,7 +150,7 @@ def test_begins_with_the_shortest_and_ends_with_the_cheapest(
 def test_what_lies_between_passes_within_the_rectangles(
     asked_and_found: tuple[Problem, Front],
 ) -> None:
-    """The premise of the spacing, asked of motions that the front does not know."""
+    """The spacing's assumption holds for motions of durations between the front's points."""
     asked, front = asked_and_found
     for left, right in list(pairwise(front.points))[:3]:
         between = optimize(replace(asked, **fixed((left.duration * right.duration) ** 0.5)))
@@ -161,7 +159,9 @@ def test_what_lies_between_passes_within_the_rectangles(
 
 @pytest.mark.long
 def test_jumps_are_found_where_they_are() -> None:
-    """A candidate that is slower to reach and far cheaper takes over at its own fastest motion."""
+    """A candidate with a longer least duration and far less energy takes over at its own fastest
+    motion.
+    """
     front = pareto(jumping(), 12, still)
     jumps = [(a, b) for a, b in pairwise(front.points) if not np.array_equal(a.goal.q, b.goal.q)]
     assert jumps
@@ -219,7 +219,7 @@ def seeded(seed: int) -> dict[str, Problem]:
     }
 
 
-# fronts that take many seconds
+# fronts with a computing time of many seconds
 SEEDED = [
     pytest.param(seed, kind, marks=pytest.mark.long if (seed, kind) != (0, "pose") else ())
     for seed in range(6)
@@ -230,8 +230,8 @@ SEEDED = [
 @pytest.mark.long
 @pytest.mark.parametrize(("seed", "kind"), SEEDED)
 def test_the_front_ends_where_optimize_ends(seed: int, kind: str) -> None:
-    """Neither is better than the other: the last point is what `optimize` answers, and no other
-    point needs less.
+    """Neither dominates the other: the last point is the answer of `optimize`, and no other point
+    needs less energy.
     """
     asked = seeded(seed)[kind]
     alone, front = optimize(asked, still), pareto(asked, 4, still)
@@ -241,7 +241,7 @@ def test_the_front_ends_where_optimize_ends(seed: int, kind: str) -> None:
     assert (least.start.label, least.goal.label) == (alone.start.label, alone.goal.label)
     assert min(objective(asked, point) for point in front.points) == objective(asked, least)
     for each in front.dropped:
-        # what was found to need less differs by no more than solves do
+        # energies found to be lower differ by the scatter of solves alone
         assert each.energy is None or each.energy > objective(asked, alone) * (
             1 - PARETO.same_energy
         )
@@ -253,7 +253,9 @@ def test_the_front_ends_where_optimize_ends(seed: int, kind: str) -> None:
 )
 @pytest.mark.long
 def test_moves_that_had_no_front_or_a_better_one(extra: dict[str, Any]) -> None:
-    """Weak motors, which left no front; and the move whose front ended 0.34 % below the answer."""
+    """Weak motors used to leave no front; the front of the other move ended 0.34 % below the
+    answer.
+    """
     asked = problem(HOME, np.array([1.2, -0.9, 1.3, -1.9, -1.57, 0.4]), collisions=True, **extra)
     alone, front = optimize(asked, still), pareto(asked, 3, still)
     assert alone.status == "optimal"
@@ -261,9 +263,7 @@ def test_moves_that_had_no_front_or_a_better_one(extra: dict[str, Any]) -> None:
 
 
 def test_a_front_whose_deadline_ended_a_search_is_not_optimal() -> None:
-    """Also where the answer that this search still found is dominated by another one, which was
-    solved to its end.
-    """
+    """Even if the answer of the interrupted search is dominated by a completed one."""
     asked = problem(
         HOME,
         HOME + np.array([0.3, 0.17, -0.17, 0.07, 0.0, 0.2]),
@@ -280,8 +280,8 @@ def test_a_front_whose_deadline_ended_a_search_is_not_optimal() -> None:
 
 @pytest.mark.parametrize("readings", [3, 10, 100, 400])
 def test_a_deadline_gives_what_was_found(readings: int) -> None:
-    """By a clock that moves on with each reading: the front comes a few readings after the
-    deadline, or none at all.
+    """The clock advances with each reading: the front arrives a few readings after the deadline, or
+    not at all.
     """
     clock = CountingClock()
     try:
@@ -298,7 +298,9 @@ def test_a_deadline_gives_what_was_found(readings: int) -> None:
 def test_a_front_without_its_end_of_least_energy_is_not_optimal(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """That search ends at its share of the deadline while the front has time left."""
+    """The search for the least energy ends at its share of the deadline while the front has time
+    left.
+    """
     solution = Run.solution
 
     def late(run: Run) -> Solution:

@@ -1,5 +1,4 @@
-"""Meshes of a user's own arm: found by their paths, and held by a capsule, every triangle of
-them."""
+"""Meshes of a user's own arm: found by their paths, with every triangle inside a capsule."""
 
 from __future__ import annotations
 
@@ -121,8 +120,7 @@ def test_a_mesh_of_the_urdf_is_held_where_it_stands(tmp_path: Path) -> None:
         assert cylinder.radius == pytest.approx(0.04)
         half = np.array([0.09, 0.03, 0.02])
         assert np.hypot(*half[1:]) <= block.radius < 1.4 * np.hypot(*half[1:])
-        # the mesh's origin is that of the URDF link `forearm`, by the bracket 0.05 and 0.1 m off
-        # the joint
+        # the mesh's origin is the URDF link `forearm`, 0.05 and 0.1 m from the joint by the bracket
         assert np.linalg.norm(block.axis.mean(axis=0)) == pytest.approx(
             np.hypot(0.05, 0.1), abs=5e-3
         )
@@ -171,7 +169,7 @@ def test_the_hull_of_a_cylinder_holds_it_closely() -> None:
 
 
 def test_a_bent_mesh_has_hulls_of_its_parts() -> None:
-    """Every triangle is within them, and the bend is free, which one hull would fill."""
+    """All triangles are inside the hulls, and the bend is free; a single hull would fill it."""
     arms = [trimesh.creation.box((180.0, 50.0, 40.0)), trimesh.creation.box((50.0, 180.0, 40.0))]
     arms[0].apply_translation((65.0, 0.0, 0.0))
     arms[1].apply_translation((0.0, 65.0, 0.0))
@@ -187,7 +185,7 @@ def test_a_bent_mesh_has_hulls_of_its_parts() -> None:
 
 @pytest.mark.parametrize("seed", long_but(range(3), range(40)))
 def test_hulls_hold_bodies_of_any_form(seed: int) -> None:
-    """Blocks side by side at random, in a mesh with uneven scales, of which some mirror it."""
+    """Random blocks side by side, in a mesh with uneven and sometimes mirroring scales."""
     rng = np.random.default_rng(seed)
     blocks = [trimesh.creation.box(rng.uniform(10.0, 150.0, 3)) for _ in range(2 + seed % 4)]
     for block in blocks:
@@ -205,7 +203,7 @@ def test_hulls_hold_bodies_of_any_form(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", long_but(range(4), range(60)))
 def test_meshes_of_any_triangles_are_held_or_refused(seed: int) -> None:
-    """Triangles of random corners, most of them without a volume, of 10 um to 1 m."""
+    """Triangles with random corners, mostly without volume, of 10 um to 1 m."""
     rng = np.random.default_rng(seed)
     corners = rng.uniform(-1.0, 1.0, (rng.integers(4, 60), 3)) * 10 ** rng.uniform(-5.0, 0.0, 3)
     faces = rng.integers(0, len(corners), (rng.integers(4, 100), 3))
@@ -314,7 +312,7 @@ def test_a_zip_that_is_none_or_too_large(monkeypatch: pytest.MonkeyPatch) -> Non
     "method", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA]
 )
 def test_a_broken_zip_is_refused_as_what_it_is(method: int) -> None:
-    """Whatever unpacks it: 300 mutants of each method."""
+    """300 mutants of each compression method."""
     target, chance, refused = io.BytesIO(), random.Random(method), 0
     with zipfile.ZipFile(target, "w", method) as archive:
         archive.writestr("a.stl", bytes(range(256)) * 20)

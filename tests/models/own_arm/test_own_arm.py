@@ -1,4 +1,4 @@
-"""A user's own arm: what Pinocchio makes of the whole URDF is what the robot made of it does."""
+"""A user's own arm agrees with Pinocchio's reading of the complete URDF."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from tests.models.own_arm.arms import AMPLE, HELD, PLAIN, RICH, RICH_ARM, refuse
 # lengths of about 1 m and torques of some 100 N·m, both by sums of a hundred products
 EXACT = 1e-14
 TORQUE = 1e-11
-# least share of random configurations that guessed shapes leave free
+# least share of random configurations free of collisions between guessed shapes
 FREE = 0.6
 
 
@@ -67,9 +67,7 @@ def test_poses_and_torques_are_those_of_the_whole_urdf(
 
 @pytest.mark.parametrize("name", ["ur3e", "ur5e"])
 def test_the_arms_of_another_package(name: str) -> None:
-    """The maker's arm, described by others: attributes with a prefix that nobody declares, rounded
-    angles.
-    """
+    """The maker's arm in other packages, with undeclared attribute prefixes and rounded angles."""
     text = (arm_folder(name) / f"{name}.urdf").read_text()
     made = robot(
         Description(
@@ -89,8 +87,8 @@ def test_the_arms_of_another_package(name: str) -> None:
 
 
 def test_digits_that_a_description_lacks() -> None:
-    """Quarter turns written with five digits are quarter turns: the arm is of the form that its
-    makers gave it.
+    """Quarter turns written with five digits are read as quarter turns: the arm has its nominal
+    form.
     """
     text = (arm_folder("ur5e") / "ur5e.urdf").read_text()
     for written in ("1.5707963267948966", "1.570796327", "1.570796326589793"):
@@ -172,8 +170,8 @@ def test_what_is_given_is_taken_with_its_source() -> None:
 
 
 def test_links_have_the_shapes_of_the_urdf() -> None:
-    """Each capsule holds its shape: corners of the box, rims of the cylinder, in the link's own
-    frame.
+    """In the link's own frame, each capsule contains its shape: corners of the box, rims of the
+    cylinder.
     """
     made = robot(RICH_ARM)
     by_link = [[each for each in made.capsules if each.link == k] for k in range(4)]
@@ -187,7 +185,7 @@ def test_links_have_the_shapes_of_the_urdf() -> None:
     )
     axes = [np.array([0.0, 0.0, -1.0]), np.array([1, 1, 0.5]) / 1.5]
     for (capsule,), points, axis in zip(by_link[1:3], (corners, forearm), axes, strict=True):
-        # the link's frame is the URDF's, turned so that z is the joint's axis
+        # the link's frame is the URDF frame, turned with z along the joint's axis
         z = capsule_frame(axis)
         begin, end = capsule.axis
         local = points @ z
@@ -222,7 +220,7 @@ def test_capsules_and_pairs_of_the_user() -> None:
 
 
 def test_pairs_of_an_srdf() -> None:
-    """Of the whole machine: links that are not the arm's, and neighbours, count as nothing."""
+    """An SRDF of the whole machine: links outside the arm and neighbouring links are ignored."""
     pairs = (
         ("pedestal", "forearm"),
         ("pedestal", "flange_arm"),
@@ -247,8 +245,8 @@ def test_pairs_of_an_srdf() -> None:
 
 
 def test_a_motion_of_least_energy() -> None:
-    """From joints to joints, certified, above its bound; without the baseline of a default that
-    nobody knows.
+    """From joints to joints, certified and above its bound; without the baseline, because the
+    controller's defaults are unknown.
     """
     made = robot(
         dataclasses.replace(RICH_ARM, collision=Collision(never_meet=(("pedestal", "elbow"),)))
@@ -267,8 +265,8 @@ def test_a_motion_of_least_energy() -> None:
 
 
 def test_pairs_that_meet_often_are_compared_and_named_with_what_leaves_them_out() -> None:
-    """Only pairs that meet in nearly every configuration are left out without a word of the user:
-    a pair that is not compared may collide in a certified motion."""
+    """Only pairs in contact in nearly every configuration are excluded without the user's consent:
+    an excluded pair may collide in a certified motion."""
     thin, fat = 0.02, 0.35
     capsules = {
         "pedestal": ((0.0, 0.0, 0.0, 0.0, 0.0, 0.1, fat),),
@@ -289,9 +287,7 @@ def test_pairs_that_meet_often_are_compared_and_named_with_what_leaves_them_out(
 
 
 def test_names_that_stand_for_the_ends_of_every_robot() -> None:
-    """And those of other figures in the section of the links' shapes: a link may be named as it
-    likes.
-    """
+    """Reserved names in the section of link shapes work too: a link may have any name."""
     for name in ("elbow", "flange", "base", "never_meet"):
         urdf = RICH.replace('"elbow"', f'"{name}"')
         figures, _ = own_figures("mine", dataclasses.replace(RICH_ARM, urdf=urdf))

@@ -1,6 +1,4 @@
-"""Obstacles of many parts: their distances, proofs and checks are those of their parts as obstacles
-of their own.
-"""
+"""Obstacles of many parts have the distances, proofs and checks of separate obstacles."""
 
 from __future__ import annotations
 
@@ -40,8 +38,7 @@ from tests.optimizer.moves import GOAL, START, problem_with
 from tests.refusals import refusal_of
 from tests.selection import long_but
 
-# two exact computations of one distance [m] differ by rounding; by Coal's tolerance where it takes
-# part
+# two exact computations of one distance [m] differ by rounding, or by Coal's tolerance
 ROUNDING = 1e-9
 COAL_TOLERANCE = 1e-7
 # a gradient by central differences of STEP [rad]: curvature of distances of centimetres, and
@@ -89,7 +86,7 @@ def torus(
 
 
 def shapes() -> dict[str, tuple[Shape, list[Obstacle]]]:
-    """A cloud of each kind, and its parts as obstacles of their own."""
+    """A cloud of each kind, and its parts as separate obstacles."""
     points, cells = around(60), np.floor(around(60, 8) / 0.06).astype(int)
     triangles = around(30, 9)[:, None] + rng(10).normal(size=(30, 3, 3)) * 0.04
     voxels = Voxels(0.06, cells)
@@ -124,7 +121,7 @@ def part(number: int, shape: Sphere | Box | Mesh, position: Array) -> Obstacle:
 
 
 def model_of(obstacles: list[Obstacle], load: int = 0) -> CollisionModel:
-    """Of the capsules alone, with which clouds are compared."""
+    """A model of capsules alone, for comparison with clouds."""
     arm = arm_in_cell(LOADS[load], Scene(obstacles))
     return CollisionModel(replace(arm, robot=replace(arm.robot, hulls=())))
 
@@ -165,7 +162,7 @@ def test_gradients_are_those_of_the_distance(kind: str) -> None:
     for j, step in enumerate(STEP * np.eye(6)):
         above, below = (model.signed_distances(q + sign * step)[0] for sign in (1, -1))
         slope = (above - below) / (2 * STEP)
-        # where the nearest part changes within the step, the two one-sided differences differ
+        # one-sided differences disagree if the nearest part changes within the step
         smooth = np.abs((above - distance) - (distance - below)) < STEP * GRADIENT
         error = np.abs(gradient[..., j] - slope)[:, chosen]
         kept = smooth[:, chosen] & (distance[:, chosen] > -MARGIN)
@@ -241,7 +238,7 @@ def test_triangle_and_segment_by_coal() -> None:
 
 
 def test_divided_triangles_cover_the_same_surface() -> None:
-    """Each piece lies in a triangle, and their areas add up to its area."""
+    """Every piece lies in a triangle, and the areas of the pieces add up to the triangle's area."""
     triangles = rng(4).normal(size=(20, 3, 3)) * 0.2
     pieces = divided(triangles)
 
@@ -266,7 +263,7 @@ def test_divided_triangles_cover_the_same_surface() -> None:
 
 
 def test_a_closed_box_is_the_box() -> None:
-    """Outside, the distance is that of the box; within, it is negative, however deep."""
+    """Outside, the distance equals the box's distance; inside, it is negative at any depth."""
     size = np.array([0.5, 0.4, 0.6])
     mesh = TriangleMesh(box_triangles(size))
     assert mesh.is_closed and not TriangleMesh(box_triangles(size)[1:]).is_closed
@@ -274,8 +271,8 @@ def test_a_closed_box_is_the_box() -> None:
     ours = by_body(model_of([Obstacle("cloud", mesh, POSE @ at([0.5, 0.2, 0.2]))]), q)
     theirs = by_body(model_of([Obstacle("box", Box(size), POSE @ at([0.5, 0.2, 0.2]))]), q)
     outside = theirs > 0
-    # the proof and the certificate need the sign within: skins of capsules hold where cores are
-    # apart
+    # the proof and the certificate need the sign inside: capsule radii apply only to separated
+    # cores
     assert (
         np.abs(ours - theirs)[outside].max() < COAL_TOLERANCE
         and (ours[~outside] < 0).all()
@@ -344,7 +341,7 @@ def test_two_obstacles_of_one_content_at_two_places() -> None:
 
 
 def test_flat_and_single_clouds_are_obstacles() -> None:
-    """In a plane, on a line, at one point: no box around them has a volume."""
+    """Points in a plane, on a line or at one point: no box around them has a volume."""
     for points in (around(50) * [1, 1, 0], around(50) * [1, 0, 0] + [0, 0, 0.3], around(1)):
         arm = arm_in_cell(scene=Scene([Obstacle("cloud", Points(points, 0.01))]))
         model = CollisionModel(arm)
@@ -411,6 +408,6 @@ def test_an_arm_that_starts_within_a_closed_mesh_collides() -> None:
     with pytest.raises(StartInCollision) as caught:
         optimize(within)
     assert "rock" in caught.value.pair and caught.value.depth > 1.0
-    # the same walls as a surface are a room, in which the arm may move
+    # without a wall, the surface is a room with space for the arm
     opened = Obstacle("room", TriangleMesh(box_triangles(room)[1:]))
     assert optimize(problem_with(START, GOAL, scene=Scene([opened]))).certificate.valid

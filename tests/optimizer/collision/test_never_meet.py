@@ -1,19 +1,19 @@
-"""Pairs of links that are not compared because they never meet: proven over every angle of the
-joints between.
+"""Link pairs excluded from collision checks never meet, proven over all angles of the joints
+between.
 
-Forearm and wrist 2, wrist 1 and wrist 3: for the convex hulls of both of the maker's meshes, which
-hold the links. The distance of two hulls changes by no more than Σ lever_j |Δq_j|, where lever_j is
-the largest distance of a point of the second hull from the axis of joint j, at any angle. A cell of
-angles is proven by the distance in its middle, or cut.
+Forearm and wrist 2, wrist 1 and wrist 3: the proof uses the convex hulls of both meshes of the
+maker, which contain the links. The distance of two hulls changes by at most Σ lever_j |Δq_j|, with
+lever_j the largest distance of a point of the second hull from the axis of joint j at any angle.
+The distance in the middle of a cell of angles proves the whole cell, or the cell is divided.
 
-Forearm and wrist 2 of a UR3e, a UR10e or a UR16e: in the same way, for the visual meshes. Their
-hulls overlap by 3 mm and 12 mm.
+Forearm and wrist 2 of a UR3e, a UR10e or a UR16e: the same proof with the visual meshes, because
+the hulls overlap by 3 mm and 12 mm.
 
-Base and upper arm: for the surface of the upper arm as the visual mesh has it, which is not convex,
-and a cylinder that holds the base. The collision mesh of the upper arm, its convex hull, fills the
-hollow in which the base stands.
+Base and upper arm: the proof uses the non-convex surface of the visual mesh of the upper arm, and a
+cylinder around the base. The collision mesh of the upper arm is its convex hull, which fills the
+hollow around the base.
 
-Arms without meshes that may be used: by their capsules, in the same way as by hulls.
+Arms without freely licensed meshes: the same proof with their capsules instead of hulls.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
 from tests.mesh_folders import FOUND, meshes
 from tests.selection import long_but
 
-# distances [m] that the links keep, as figures.yaml states them
+# distances [m] proven between the links, as stated in figures.yaml
 BY_HULLS = {
     ("ur5e", 3, 5): 0.005,
     ("ur5e", 4, 6): 0.010,
@@ -53,21 +53,21 @@ BY_SURFACE = {
     ("ur10e", 0, 2): 0.005,
     ("ur16e", 0, 2): 0.005,
 }
-# the same of capsules: pairs that are compared, and the comparison refuses nothing
+# the same of capsules, for compared pairs: the comparison rejects no configuration
 BY_CAPSULES = {
     (name, *pair): 0.005 for name in ("ur15", "ur20", "ur30") for pair in ((0, 2), (4, 6))
 }
 # arms of the same kinematics and capsules as another
 TWINS = {"ur7e": "ur5e", "ur12e": "ur10e"}
-# largest edge of a piece of a surface [m], and range of an angle that is looked at first [rad]
+# largest edge of a piece of a surface [m], and first range of angles in the subdivision [rad]
 EDGE = 4e-3
 FIRST_STEP = np.deg2rad(8.0)
-# height [m] of the base below which it is widest
+# height [m] of the base, above the widest part of its foot
 FOOT = {"ur5e": 0.074, "ur3e": 0.03, "ur10e": 0.074, "ur16e": 0.074}
 
 
 def here(pairs: Iterable[tuple[str, int, int]]) -> list[tuple[str, int, int]]:
-    """The pairs of robots whose meshes are here."""
+    """The pairs of the robots with meshes on this machine."""
     return sorted(pair for pair in pairs if pair[0] in FOUND)
 
 
@@ -98,8 +98,8 @@ def surface(robot: Robot, link: int) -> coal.CollisionGeometry:
 
 
 def distances(robot: Robot, first: int, second: int, angles: Array, by_meshes: bool) -> Array:
-    """Distances (k,) [m] of two links at angles (k, 2) [rad] of the two joints between them: of
-    hulls or of meshes.
+    """Distances (k,) [m] of two links, as hulls or as meshes, at angles (k, 2) [rad] of the two
+    joints between them.
     """
     q = np.zeros((len(angles), robot.nq))
     q[:, first:second] = angles
@@ -140,7 +140,7 @@ def capsule_distances(
                 one, first * T_one, other, second * T_other, request, coal.DistanceResult()
             )
         )
-    # of the axes, which coal grows a little, less both radii
+    # of the axes, slightly enlarged for coal, less both radii
     return np.array(result) + own + others - sum(capsule.radius for capsule in capsules)
 
 
@@ -179,7 +179,7 @@ def test_capsules_that_never_meet(name: str, first: int, second: int) -> None:
         [capsule for capsule in robot.capsules if capsule.link == link] for link in (first, second)
     ]
     for one, other in product(*sides):
-        # by that of their axes: the radii do not turn
+        # by the distance of their axes: the radii do not turn
         assert_apart(
             partial(capsule_distances, robot, (one, other)),
             sum(levers(robot, second, other.axis)),
@@ -224,12 +224,12 @@ def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
         is_long = edges.max(axis=1) > EDGE
         pieces = cut(pieces[is_long], edges[is_long].argmax(axis=1))
     points = np.unique(np.round(np.concatenate(small).reshape(-1, 3), 3), axis=0)
-    # no point of the surface is farther from a corner of its piece than this, nor a corner from
-    # where it is rounded to
+    # bounds the distance of any point of the surface from a corner of its piece, and of a corner
+    # from its rounded position
     spacing = EDGE / np.sqrt(3) + np.sqrt(3) / 2 * 1e-3
     lever = np.linalg.norm(points[:, :2], axis=1)
     half, placements = FIRST_STEP / 2, joint_placements(robot.model)
-    # of every range of angles, the points that are not yet proven to keep away
+    # points of the surface without a proof yet, for every range of angles
     open_ranges = [
         (angle, np.arange(len(points))) for angle in np.arange(-np.pi + half, np.pi, FIRST_STEP)
     ]
@@ -254,8 +254,8 @@ def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
 
 @pytest.mark.parametrize("name", robot_names())
 def test_all_pairs_that_are_left_out_are_proven(name: str) -> None:
-    """By meshes that are not always here for some: `tests.mesh_folders`. Or the figure says that
-    they are others'.
+    """Meshes of some robots may be missing (see `tests.mesh_folders`); otherwise the figure's note
+    says that nothing is proven.
     """
     known = (*BY_HULLS, *BY_MESHES, *BY_SURFACE)
     proven = {(first, second) for robot, first, second in known if robot == TWINS.get(name, name)}
@@ -268,7 +268,7 @@ def test_all_pairs_that_are_left_out_are_proven(name: str) -> None:
 
 @pytest.mark.parametrize("name", TWINS)
 def test_a_twin_has_the_same_shape(name: str) -> None:
-    """So what is proven of the one holds for the other."""
+    """A proof for one robot therefore holds for its twin."""
     robot, twin = load_robot(name), load_robot(TWINS[name])
     own, same = (
         np.array([[*each.axis.ravel(), each.radius, each.link] for each in r.capsules])

@@ -48,7 +48,7 @@ from tests.optimizer.moves import ROBOT, problem_with
 from tests.optimizer.placement.cells import at
 from tests.selection import long_but
 
-# s: ample, so that a seed and not the machine's load decides what is found
+# s: ample, so the seed decides the result, independent of the machine's load
 AMPLE = 60.0
 # rad: no path leaves the range between start and goal by more
 WIDEST = max(region.margin for region in REGIONS)
@@ -227,9 +227,9 @@ def test_no_path_to_a_goal_in_collision() -> None:
 
 
 def walled_in() -> tuple[Arm, Array, Array]:
-    """The task of the post with walls across all that the arm reaches, but for where it stands.
+    """The task of the post, with walls across the whole reach except around the base.
 
-    Within the tight limits it cannot fold back so far that it passes there.
+    With the tight limits, the arm cannot fold back enough to pass there.
     """
     arm, q_start, q_goal = task("post")
     wall = Obstacle("wall", Box(np.array([3.0, 0.02, 3.0])), at(1.77, 0.0, 1.0))
@@ -280,7 +280,7 @@ def test_motions_avoid_the_obstacles(name: str) -> None:
 def test_a_motion_deep_inside_an_obstacle_is_left_for_a_planned_path_once_one_is_known(
     incumbent_cost: float, was_postponed: bool, planned: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # what got out at great cost is compared with planned paths, too
+    # a costly escape is compared with planned paths, too
     monkeypatch.setattr(free_spline, "FREE_SPLINE", replace(FREE_SPLINE, detour_cost=np.inf))
     arm, q_start, q_goal = task("post")
     # the optimiser alone finds a way out with the capsules of the links
@@ -297,8 +297,8 @@ def test_a_motion_deep_inside_an_obstacle_is_left_for_a_planned_path_once_one_is
 
 
 def test_a_request_among_obstacles_has_the_same_answer_whatever_time_it_takes() -> None:
-    """The clock stands still, or ticks at each reading as on a busy machine: the deadline is far
-    either way.
+    """The clock stands still, or ticks at each reading as on a busy machine: both stay far from the
+    deadline.
     """
     asked = problem(*task("cage"))
     calm, busy = optimize(asked, clock=still), optimize(asked, clock=CountingClock(tick=1e-4))
@@ -396,7 +396,7 @@ def test_samples_along_a_path_rest_at_its_ends_and_round_its_corners() -> None:
     a = np.gradient(v, t, axis=0)
     # the quintic law's v and a grow with t² and t: by 30 l t²/T³ and 60 l t/T³ at the second sample
     assert np.abs(v[[0, -1]]).max() < 1e-2 and np.abs(a[[0, -1]]).max() < 0.3
-    # the corner is cut by less than what it is rounded over: 6 % of a length of 3
+    # the cut at the corner is smaller than the rounding radius: 6 % of a length of 3
     corner = np.linalg.norm(q - path[1], axis=1).min()
     assert 0.01 < corner < 0.06 * 3
     assert (np.diff(q, axis=0) >= -1e-12).all()

@@ -1,6 +1,4 @@
-"""What stands in for a tool and a payload without a shape: its size, its depth in obstacles, and
-where nothing does.
-"""
+"""Stand-ins for tools and payloads without a shape: size, depth in obstacles, and absence."""
 
 from __future__ import annotations
 
@@ -32,7 +30,7 @@ from joulepath.optimizer.kinematics.tcp import tcp_pose
 from tests.optimizer.cells import at
 from tests.optimizer.moves import AMPLE, HOME, ROBOT
 
-# m: a depth from frames against that from the pose of the TCP
+# m: a depth from frames against the depth from the pose of the TCP
 ROUNDED = 1e-9
 LENGTH = 0.15
 MASS = 4.0
@@ -59,7 +57,7 @@ def lowest(q: Array) -> float:
 
 
 def contacts(asked: Arm, *q: Array) -> dict[str, Clearance]:
-    """Contacts at configurations a second apart, by what is carried."""
+    """Contacts at configurations a second apart, by the name of the carried body."""
     found = StandIns.of(asked)
     assert found is not None
     return {
@@ -80,7 +78,7 @@ def test_the_rod_ends_at_the_tcp_and_the_ball_has_the_mass() -> None:
 
 
 def test_the_margin_does_not_count() -> None:
-    """It is asked for between shapes; what stands in for one is only told where it would touch."""
+    """Margins apply between shapes; a stand-in only reports contact."""
     assert contacts(arm(floor(lowest(DOWN) - BALL - 0.01, margin=0.2)), DOWN) == {}
 
 
@@ -99,7 +97,7 @@ def test_a_tilted_rod_touches_with_its_side() -> None:
 
 
 def test_the_deepest_obstacle_is_named() -> None:
-    """A box beside the TCP, a ball in which the payload is, and a floor that nothing reaches."""
+    """A box beside the TCP, a ball around the payload, and a floor out of reach."""
     T = tcp_pose(arm(Scene()), DOWN)
     beside = T[:3, 3] + [SETTINGS.tool_radius + 0.1 - 0.004, 0.0, SETTINGS.tool_radius]
     scene = Scene(

@@ -1,5 +1,5 @@
-"""Bus modes: the store's law, the balance in every mode, and what is found on one bus against
-another.
+"""Bus modes: the law of the store, the energy balance of every mode, and searches on different
+buses.
 """
 
 from __future__ import annotations
@@ -27,8 +27,7 @@ from tests.selection import long_but
 
 ROUNDING = 1e-9  # relative; sums of some thousand terms
 PROGRAMME = 1e-7  # relative; the linear programme's own tolerance
-# relative; two searches end in optima that their stopping rules and smoothing tell apart by that
-# much
+# relative; scatter of two searches by their stopping rules and smoothing
 SEARCH = 5e-3
 SAME_OPTIMUM = (
     2e-2  # relative; optima with net power near zero for long stretches are flat and smoothed
@@ -64,7 +63,7 @@ def total(name: str, bus: Bus) -> float:
 
 
 def course(seed: int, count: int = 40) -> tuple[Array, Array]:
-    """Power of two joints (k, 2) [W] that swings about zero, and intervals (k,) [s]."""
+    """Power of two joints (k, 2) [W] swinging about zero, and intervals (k,) [s]."""
     rng = np.random.default_rng(seed)
     return rng.normal(scale=150.0, size=(count, 2)), rng.uniform(0.005, 0.05, count)
 
@@ -83,7 +82,7 @@ BUSES = [
 @pytest.mark.parametrize("bus", BUSES, ids=lambda bus: f"{bus.mode} {bus.efficiency} {bus.initial}")
 @pytest.mark.parametrize("regeneration", [0.0, 0.4])
 def test_energy_is_conserved_on_every_bus(bus: Bus, regeneration: float) -> None:
-    """Net demand = drawn - burnt - lost in the store + fall of its charge, whatever flows."""
+    """Net demand = drawn - burnt - lost in the store + fall of its charge, for any power."""
     for seed in range(20):
         joints, weights = course(seed)
         back = (
@@ -240,7 +239,9 @@ def test_the_charge_is_in_the_answer() -> None:
 
 @pytest.mark.parametrize("mode", ["isolated", "recuperating"])
 def test_the_kernel_knows_the_mode(mode: Any) -> None:
-    """Its cost is the exact draw but for the corners, and its gradient is that of its cost."""
+    """The kernel's cost is the exact draw except near corners, and its gradient is the slope of its
+    cost.
+    """
     compile_kernel(ROBOT)
     inverter = Inverter(constant=1.2, linear=np.linspace(0.1, 0.6, 6), quadratic=0.02)
     task = PreparedProblem.of(
@@ -277,9 +278,7 @@ def test_the_kernel_knows_the_mode(mode: Any) -> None:
 @pytest.mark.parametrize("name", long_but(("down",), MOVES))
 @pytest.mark.parametrize("bus", BUSES, ids=lambda bus: f"{bus.mode} {bus.efficiency} {bus.initial}")
 def test_bounds_hold_on_every_bus(name: str, bus: Bus) -> None:
-    """The energies of optimised motions over other buses, too: every motion is one that each bus
-    allows.
-    """
+    """Energies of optimised motions, also on other buses: every bus admits every motion."""
     move = MOVES[name]
     task = PreparedProblem.of(problem(**move, payload=HEAVY, bus=bus))
     start, goal = np.array(move["start"], dtype=float), np.array(move["goal"], dtype=float)
@@ -296,8 +295,8 @@ def test_bounds_hold_on_every_bus(name: str, bus: Bus) -> None:
 
 
 def test_inverter_figures_replace_the_robots() -> None:
-    """By hand: what is added is constant · T + linear ∫|i| + quadratic ∫i², and the bound pays the
-    constant.
+    """By hand: the added loss is constant · T + linear ∫|i| + quadratic ∫i², and the bound includes
+    the constant.
     """
     compile_kernel(ROBOT)
     plain, lossy = (

@@ -116,7 +116,7 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 
 
 def certain(spread: Spread) -> Spread:
-    """Without any error: the worth of a watt is that of the figures themselves."""
+    """Without any error: the slope per watt is the slope of the figures themselves."""
     return replace(spread, mean=0 * spread.mean, root=0 * spread.root)
 
 
@@ -148,7 +148,7 @@ def test_the_gradient_is_the_slope(name: str, monkeypatch: pytest.MonkeyPatch) -
         step = STEP * max(abs(base[k]), 0.1)
         up, down = base.copy(), base.copy()
         up[k] += step
-        # a coefficient that is zero cannot fall
+        # a coefficient of zero cannot fall
         down[k] -= step if base[k] > 0 else 0.0
         slope = (energy(up) - energy(down)) / (up[k] - down[k])
         # the corners of |i| and of the power move a little: in watts over the motion
@@ -170,7 +170,7 @@ def masses(robot: Robot) -> list[float]:
 
 
 def with_link_errors(robot: Robot) -> Robot:
-    """The robot with masses of links that are known to 5 %."""
+    """The robot with link masses known to 5 %."""
     names = [f"inertials.m.{joint}" for joint in range(6)]
     matrix = np.diag([(0.05 * mass) ** 2 for mass in masses(robot)]).tolist()
     return replace(
@@ -180,8 +180,7 @@ def with_link_errors(robot: Robot) -> Robot:
 
 @pytest.mark.parametrize("name", ["shared", "load", "isolated", "dwell by motors"])
 def test_the_gradient_by_the_links_is_the_slope(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Under a tilted gravity, with links of another weight, which multiplies that of the
-    figures."""
+    """Under a tilted gravity, with scaled link masses, which multiply the masses of the figures."""
     given = dict(CONDITIONS[name]) | {"gravity": TILTED}
     given.pop("inverter", None)
     robot, spline = with_link_errors(given.pop("robot", ROBOT)), quintic_spline(START, GOAL, 0.9)
@@ -249,7 +248,7 @@ def test_the_interval_is_that_of_drawn_figures() -> None:
         low, high = np.quantile(values_, [0.05, 0.95])
         assert abs(each.p5 - low) < 2 * ENDS * half and abs(each.p95 - high) < 2 * ENDS * half
         assert each.sd == pytest.approx(values_.std(), rel=ENDS)
-    # what both motions share cancels out
+    # errors common to both motions cancel
     assert saving.sd < 0.5 * interval.sd / found.energy.electrical.total
     assert interval.p5 < found.energy.electrical.total < interval.p95
 
@@ -271,7 +270,7 @@ def test_shares_add_up_and_the_same_motion_has_the_same_interval() -> None:
     assert [each.saving_interval for each in one.baselines] == [
         each.saving_interval for each in two.baselines
     ]
-    # a motion that takes longer hangs more on the electronics
+    # a longer motion depends more on the electronics
     slow = optimize(problem(duration_min=4.0, duration_max=4.0)).energy.electrical.interval
     assert slow is not None and slow.shares["idle_power"] > interval.shares["idle_power"]
 
@@ -349,8 +348,8 @@ def identified(move_sd: float = MOVE_SD, session_sd: float = SESSION_SD) -> Robo
 
 
 def test_identified_figures_cover_the_truth() -> None:
-    """Arms drawn from what the document says of itself, on other days, with what no model
-    expresses: P5 to P95 holds about 90 % of their energies. Without the last two parts it holds far
+    """Arms drawn from the document's distribution, on other days, with unmodelled effects: P5 to
+    P95 contains about 90 % of their energies. Without the last two contributions it contains far
     less."""
     robot = identified()
     arm = problem(robot=robot, payload=PAYLOAD).arm
@@ -376,7 +375,7 @@ def test_identified_figures_cover_the_truth() -> None:
     for k in range(count_):
         error = truth.multivariate_normal(np.zeros(len(names)), matrix, method="eigh")
         vector = base.copy()
-        # figures that were not identified err by their ranges
+        # errors of figures without identification are their ranges
         for name in ("rotor_inertia", "inverter_linear"):
             vector[place(name, 6)] += others[truth.integers(DRAWS), place(name, 6)]
         for name, by in zip(names, error, strict=True):

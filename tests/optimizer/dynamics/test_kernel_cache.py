@@ -1,7 +1,6 @@
-"""The compiled kernel's life: its name, its seal, who compiles it, and who waits for it.
+"""The life of a compiled kernel: name, seal, compilation, and waiting of concurrent processes.
 
-Tests that compile do it without optimisation, by a compiler that adds a flag and leaves a line for
-each of its calls.
+Tests compile without optimisation, by a compiler that adds a flag and logs its calls.
 """
 
 from __future__ import annotations
@@ -53,7 +52,7 @@ def whole() -> Path:
 
 
 def test_the_digest_tells_chains_apart() -> None:
-    """What is compiled in changes it; what a request passes as a parameter does not."""
+    """Compiled-in values change the digest; parameters passed by a request do not."""
     same = replace(
         ROBOT, drives=LOSSY, electronics=replace(ROBOT.electronics, idle_power=1.0), title="another"
     )
@@ -92,8 +91,8 @@ def test_the_digest_covers_every_source_that_runs_while_the_c_is_written() -> No
 
 @dataclass
 class Workshop:
-    """A cache directory of its own and a compiler that counts its calls; `robot` has been loaded by
-    nobody else.
+    """A separate cache directory and a compiler that counts its calls; `robot` is loaded here for
+    the first time.
     """
 
     folder: Path
@@ -109,7 +108,7 @@ class Workshop:
         return sorted(map(str, (self.folder / "cache").glob("*.so")))
 
     def leftovers(self) -> list[str]:
-        """What is in the cache besides the library, its seal and its lock."""
+        """Files in the cache besides the library, its seal and its lock."""
         known = {".so", ".sha256", ".lock"}
         return [path.name for path in (self.folder / "cache").iterdir() if path.suffix not in known]
 
@@ -183,7 +182,7 @@ def test_the_virtual_machine_serves_while_the_compiler_runs(workshop: Workshop) 
 
 
 def test_threads_that_come_at_once_share_one_kernel(workshop: Workshop) -> None:
-    """The first to come builds or loads it, and one of them has it compiled."""
+    """The first thread loads or builds the kernel, and it is compiled once."""
     count = 8
     together = threading.Barrier(count)
 
@@ -336,7 +335,7 @@ def test_trouble_while_compiling_is_logged_and_survived(
 def test_a_folder_that_cannot_be_looked_into_is_no_failure(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """As another user's home; here by a name that is too long, which stops root as well."""
+    """Like another user's home; a name that is too long has this effect for root as well."""
     monkeypatch.setenv("JOULEPATH_CACHE_DIR", f"/{'x' * 300}")
     loader = kernel._Loader(ROBOT)
     loader._interpreted = kernel_for(ROBOT)

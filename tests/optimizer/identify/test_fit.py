@@ -1,4 +1,4 @@
-"""Friction, rotor inertia and power from logs of simulated arms whose figures are known."""
+"""Friction, rotor inertia and power from logs of simulated arms with known parameters."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from tests.selection import long_but
 ROBOT = load_robot("ur10e")
 # rows of all curves together, in place of the service's number: logs are shorter, too
 MOST = 100
-# joints of which the load term is told
+# joints with an identifiable load term
 LOADED = (1, 2)
 
 
@@ -61,7 +61,7 @@ def without_power(log: Log, **changed: object) -> Log:
 
 def test_every_friction_figure_is_found_within_its_standard_deviations() -> None:
     truth, found = run()
-    # a load term that is left out biases the others of its joint
+    # an omitted load term biases the other terms of its joint
     told = [
         each for each in found.parameters if each.identified and each.joint in (*LOADED, 3, 4, 5)
     ]
@@ -77,7 +77,7 @@ def test_every_friction_figure_is_found_within_its_standard_deviations() -> None
 def test_the_fitted_figures_predict_held_out_moves_better_than_the_robots_own() -> None:
     _, found = run(options=IdentificationOptions())
     torque, own_torque = torque_errors(found.validation)
-    # what is left is the noise of the current
+    # the residual is the noise of the current
     assert (torque.relative < 0.5 * own_torque.relative).all()
     power, own_power = power_errors(found.validation)
     assert found.validation is not None and found.validation.constant is not None
@@ -86,7 +86,7 @@ def test_the_fitted_figures_predict_held_out_moves_better_than_the_robots_own() 
 
 @pytest.mark.long
 def test_curves_show_each_row_by_figures_that_may_predict_it() -> None:
-    """All moves, once; what is left over has the size that the validation says."""
+    """Curves show every move once; their residuals have the size stated by the validation."""
     _, found = run(options=IdentificationOptions())
     assert found.validation is not None and found.validation.fitted.torque is not None
     seen, blind = found.curves, found.validation.curves
@@ -95,7 +95,7 @@ def test_curves_show_each_row_by_figures_that_may_predict_it() -> None:
     )
     assert len(np.unique(blind.move)) == found.validation.moves
     left = blind.torque - blind.modelled_torque
-    # every k-th row: a sample of the rows that the validation averages over
+    # every k-th row: a sample of the rows averaged by the validation
     np.testing.assert_allclose(
         np.sqrt(np.nanmean(left**2, axis=0)), found.validation.fitted.torque.rmse, rtol=0.1
     )
@@ -143,7 +143,7 @@ def test_load_friction_makes_the_difference_where_there_is_load() -> None:
 
 @pytest.mark.parametrize("scale", long_but([0.88], [0.88, 1.0]))
 def test_power_alone_tells_how_heavy_the_links_are(scale: float) -> None:
-    """The power of lifting tells it; the payload, which is known, is not scaled with them."""
+    """The power of lifting determines the scale of the links; the known payload is not scaled."""
     none = np.zeros((3, 3))
     real = replace(ROBOT, model=ROBOT.loaded_model(0.0, none[0], none, GRAVITY, np.full(6, scale)))
     truth = truth_of(ROBOT, 3, Payload(mass=4.0, com=np.array([0.0, 0.0, 0.05])))
@@ -168,7 +168,7 @@ def test_power_alone_tells_how_heavy_the_links_are(scale: float) -> None:
 
 
 def test_power_without_lifting_does_not_tell_how_heavy_the_links_are() -> None:
-    """Of an arm that turns about its upright axis alone."""
+    """The arm turns about its upright axis alone."""
     log = recorded(ROBOT, truth_of(ROBOT), moves=8).log()
     first = np.arange(ROBOT.nq) == 0
     motion = {name: np.where(first, getattr(log, name), 0.0) for name in ("q", "v", "a")}
@@ -190,7 +190,7 @@ def test_power_without_lifting_does_not_tell_how_heavy_the_links_are() -> None:
 
 
 def still(recording: Recording, joint: int) -> Log:
-    """The log of the recording as if a joint had not moved: its torque is only that of holding."""
+    """The log of the recording with one joint at rest: its torque is the holding torque alone."""
     log = recording.log()
     q, v, a, effort = (np.array(each) for each in (log.q, log.v, log.a, log.effort))
     q[:, joint], v[:, joint], a[:, joint] = 0.3, 0.0, 0.0
@@ -272,7 +272,7 @@ def test_a_log_with_gravity_compensated_efforts_is_identified_by_its_power() -> 
 
 
 def test_power_figures_are_identified_though_the_robots_own_are_0() -> None:
-    """Of a robot of one's own, or of figures that an earlier fit has put at their bound."""
+    """For a user's own robot, or after an earlier fit has set parameters to their bound of 0."""
     drives = replace(ROBOT.drives, copper=np.zeros(ROBOT.nq))
     bare = replace(ROBOT, drives=drives, electronics=replace(ROBOT.electronics, idle_power=0.0))
     truth = truth_of(ROBOT)
@@ -312,11 +312,11 @@ def with_outliers(log: Log) -> Log:
 
 def test_reweighting_keeps_outliers_out() -> None:
     truth = truth_of(ROBOT)
-    # at the rate of the rows, where no average over samples spreads an outlier
+    # at the rate of the rows: no average over samples spreads an outlier
     log = with_outliers(recorded(ROBOT, truth, moves=10, rate=100.0).log())
 
     def error(found: Identification) -> Array:
-        # of the offset, which one-sided outliers move most
+        # of the offset, the parameter most affected by one-sided outliers
         return np.abs(found.fitted.arm.offset - truth.offset)[list(LOADED)]
 
     plain, robust = (
@@ -346,7 +346,7 @@ def test_more_noise_gives_larger_standard_deviations() -> None:
 
 
 def test_torque_constants_follow_from_gravity_where_the_payload_is_known() -> None:
-    """Paes: with known links, the current that holds them says how much torque an ampere gives."""
+    """Paes: with known links, the holding current gives the torque constant [N·m/A]."""
     truth = truth_of(ROBOT, 2)
     real = truth.torque_constant * np.array([1.0, 1.06, 0.95, 1.04, 1.0, 1.0])
     log = without_power(recorded(ROBOT, replace(truth, torque_constant=real), moves=14).log())

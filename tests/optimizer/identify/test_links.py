@@ -1,5 +1,4 @@
-"""Base parameters and refitted links: their number, their torques, and that they are real
-bodies."""
+"""Base parameters and refitted links: number, torques, and physical consistency."""
 
 from __future__ import annotations
 
@@ -27,7 +26,7 @@ from tests.identification_logs import recorded, torque_errors, truth_of
 from tests.impossible_links import with_impossible_link
 
 ROUNDING = 1e-9
-# Gautier and Khalil's numbers for arms of these forms, without rotors and with them
+# Gautier and Khalil's numbers for arms of these forms, without rotors and with rotors
 COUNTS = {"ur5e": (36, 40), "ur10e": (36, 40), "panda": (43, 48), "iiwa14": (43, 48)}
 
 
@@ -70,7 +69,7 @@ def test_real_bodies_have_positive_pseudo_inertias_and_no_others() -> None:
 
 @pytest.mark.parametrize("name", robot_names())
 def test_nearness_is_a_distance_for_every_robot(name: str) -> None:
-    """Also of parameters that no real body has, as the published ones of one link of the Panda."""
+    """Also for parameters of no real body, such as published ones of a link of the Panda."""
     metric = distance_metric(body_parameters(load_robot(name).model))
     scale = 1 / np.sqrt(np.diag(metric))
     assert np.linalg.eigvalsh(metric * np.outer(scale, scale))[0] > 0
@@ -98,7 +97,7 @@ def test_nearness_does_not_depend_on_the_frame() -> None:
         change = two.toDynamicParameters() - one.toDynamicParameters()
         return float(change @ distance_metric(one.toDynamicParameters()) @ change)
 
-    # a body that has no extent is given some, in every frame
+    # a body without extent is given some, in every frame
     assert distance(placement.act(body), placement.act(other)) == pytest.approx(
         distance(body, other), rel=0.02
     )
@@ -141,7 +140,7 @@ def test_a_refit_finds_links_that_the_robots_own_are_not() -> None:
         for refit in (False, True)
     )
     before, after = (torque_errors(each.validation)[0] for each in (kept, refitted))
-    # the other joints carry little, and what is left there is the noise of the current
+    # the other joints carry little, and their residual is the noise of the current
     assert (after.relative < 1.01 * before.relative).all() and after.relative[
         1
     ] < 0.2 * before.relative[1]
@@ -156,7 +155,7 @@ def test_a_refit_finds_links_that_the_robots_own_are_not() -> None:
 
 
 def test_a_refit_of_a_right_model_moves_nothing_that_matters() -> None:
-    """The prior keeps what the log does not tell, and the log has nothing against the rest."""
+    """The prior fixes undetermined parameters, and the log confirms the rest."""
     robot = load_robot("ur10e")
     found = identify(
         robot,
@@ -171,8 +170,8 @@ def test_a_refit_of_a_right_model_moves_nothing_that_matters() -> None:
 
 
 def test_errors_of_refitted_links_are_those_that_the_document_says() -> None:
-    """Torques of other motions, by links that the robot's own are not, and how far they may be
-    off."""
+    """Torques of other motions, by refitted links that differ from the robot's own, and their error
+    bounds."""
     robot = load_robot("ur10e")
     real = heavier(robot)
     log = replace(recorded(real, truth_of(real, 1), moves=12).log(), power=None)

@@ -1,4 +1,4 @@
-"""The methods of the literature by name, each where the truth is known."""
+"""Identification methods of the literature, by author, on simulated logs with known parameters."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def fourier(nq: int, periods: int, seed: int = 0) -> tuple[Array, Array, Array]:
 
 
 def log_of(truth: Truth, q: Array, v: Array, a: Array, noise: Array, **channels: Any) -> Log:
-    """A log of torques, whose noise has the standard deviations (nq,) [N·m]."""
+    """A log of torques with noise of standard deviations (nq,) [N·m]."""
     rigid = rigid_torques(ROBOT.model, q, v, a)
     friction = truth.coulomb * v / np.hypot(v, ROBOT.friction.knee) + truth.viscous * v
     torque = rigid + truth.rotor_inertia * a + friction
@@ -67,8 +67,8 @@ def log_of(truth: Truth, q: Array, v: Array, a: Array, noise: Array, **channels:
 
 
 def away(found: Identification, truth: Truth) -> Array:
-    """Errors of the figures over their standard deviations; base parameters are those of the robot
-    itself."""
+    """Errors of the fitted parameters over their standard deviations; the true base parameters are
+    the robot's own."""
     errors = []
     for each in found.parameters:
         true = (
@@ -85,7 +85,7 @@ SIZES = np.array([2.0, 2.0, 1.0, 0.2, 0.2, 0.1])
 def test_maximum_likelihood_from_a_periodic_excitation() -> None:
     """Swevers: joints with noise of different size are weighted by it, and the covariance holds."""
     truth, (q, v, a) = truth_of(ROBOT), fourier(ROBOT.nq, 8)
-    # of rotors that one cannot tell from links, the true inertia is the robot's own
+    # of rotors indistinguishable from links, the true inertia is the robot's own
     truth = replace(truth, rotor_inertia=ROBOT.drives.rotor_inertia)
     options = IdentificationOptions(method="periodic", period=PERIOD, terms=PLAIN, held_out=0.0)
     log = log_of(truth, q, v, a, SIZES)
@@ -93,14 +93,14 @@ def test_maximum_likelihood_from_a_periodic_excitation() -> None:
     assert found.noise is not None and found.noise.periods == 8
     assert found.noise.deviation == pytest.approx(SIZES, rel=0.06)
     assert found.noise.excess == pytest.approx(1.0, abs=0.1)
-    # 40 base parameters, of which four are rotors, and 12 figures of friction
+    # 40 base parameters, including four rotors, and 12 friction parameters
     assert len(found.parameters) == 52 and np.abs(away(found, truth)).max() < FAR
     assert np.mean(away(found, truth) ** 2) == pytest.approx(1.0, abs=0.6)
-    # a model that misses something is told by it
+    # an unmodelled torque raises the excess of the noise
     missed = replace(log, effort=np.array(log.effort) + np.where(np.abs(v) < 0.3, np.sign(v), 0.0))
     wrong = identify(ROBOT, [missed], options)
     assert wrong.noise is not None and wrong.noise.excess > 2
-    # another motion, by figures that have no body behind them
+    # another motion, predicted by parameters without a physical body
     others = log_of(truth, *fourier(ROBOT.nq, 1, seed=5), SIZES)
     assert torque_errors(found.validate([others]))[0].rmse == pytest.approx(SIZES, rel=0.15)
     assert found.physical is None and "mass" not in found.figures().values
@@ -143,8 +143,7 @@ def test_base_parameters_without_knowledge_of_the_links() -> None:
 
 
 def test_essential_parameters_are_told_and_the_rest_is_the_robots_own() -> None:
-    """Verdonck, Radkhah: what a log does not tell is left out, and what is left is told the
-    better."""
+    """Verdonck, Radkhah: without undetermined parameters, the remaining ones are more precise."""
     truth = replace(truth_of(ROBOT), rotor_inertia=ROBOT.drives.rotor_inertia)
     log = log_of(truth, *fourier(ROBOT.nq, 2), 2 * SIZES)
     every, essential = (
@@ -162,7 +161,7 @@ def test_essential_parameters_are_told_and_the_rest_is_the_robots_own() -> None:
 
 
 def test_the_wrench_beneath_the_arm_is_that_of_its_links() -> None:
-    """By Pinocchio: the force that the first joint takes is what the base exerts on all links."""
+    """The force on the first joint, by Pinocchio, is the force of the base on all links."""
     model, (q, v, a) = ROBOT.model, fourier(ROBOT.nq, 1)
     bare = model.copy()
     bare.armature = np.zeros(model.nv)
@@ -176,8 +175,7 @@ def test_the_wrench_beneath_the_arm_is_that_of_its_links() -> None:
 
 
 def test_links_from_the_wrench_beneath_the_arm() -> None:
-    """Christoforou: links that are heavier than the robot's own are found, however great friction
-    is."""
+    """Christoforou: links heavier than the robot's own are found, however large the friction is."""
     model, (q, v, a) = ROBOT.model, fourier(ROBOT.nq, 4)
     real = model.copy()
     for body in list(real.inertias)[1:]:
@@ -203,7 +201,7 @@ def test_links_from_the_wrench_beneath_the_arm() -> None:
     change = np.array([each.value - each.previous for each in found.parameters])
     true, own = (rigid_torques(each, *test) for each in (real, model))
     fitted = own + rigid_regressor(model, *test) @ change
-    # joint 1 turns about gravity: its torque is of inertias alone, which the prior holds
+    # joint 1 turns about gravity: its torque depends on inertias alone, fixed by the prior
     off, before = (np.linalg.norm(each - true, axis=0)[1:4] for each in (fitted, own))
     assert (off < 0.1 * before).all()
     assert "coulomb" not in body
@@ -230,8 +228,8 @@ def test_links_from_the_wrench_do_not_depend_on_the_payload() -> None:
 
 @pytest.mark.long
 def test_four_times_the_moves_halve_the_deviations() -> None:
-    """Verdonck, Radkhah: what a log tells of a figure goes by how it excites it; and the truth is
-    within it.
+    """Verdonck, Radkhah: the deviation of a parameter depends on its excitation by the log, and the
+    interval contains the true value.
     """
     truth = truth_of(ROBOT)
     deviations = []
@@ -274,8 +272,8 @@ def test_electrical_power_does_without_torques() -> None:
 
 
 def test_friction_at_the_reference_temperature() -> None:
-    """Hao: a log that begins cold has the friction of its mean temperature, and less is left
-    over."""
+    """Hao: a log that begins cold yields the friction at its mean temperature, and smaller
+    residuals."""
     truth = replace(truth_of(ROBOT), load=np.zeros(ROBOT.nq), offset=np.zeros(ROBOT.nq))
     log = replace(recorded(ROBOT, truth, moves=24).log("torque"), power=None)
     warm = np.linspace(20.0, 50.0, len(log.time))[:, None] * np.ones(ROBOT.nq)
@@ -309,7 +307,9 @@ def test_friction_at_the_reference_temperature() -> None:
 
 
 def test_figures_above_the_threshold_velocity() -> None:
-    """Vuong: friction that rises below a speed does not bias the figures of what is above it."""
+    """Vuong: friction that rises below a threshold speed does not bias the parameters of higher
+    speeds.
+    """
     truth, (q, v, a) = truth_of(ROBOT), fourier(ROBOT.nq, 8)
     log = log_of(truth, q, v, a, 0.1 * SIZES)
     slow = 0.8 * truth.coulomb * np.sign(v) * np.maximum(1 - np.abs(v) / 0.3, 0.0)
@@ -334,14 +334,16 @@ def test_figures_above_the_threshold_velocity() -> None:
 
 
 def stribeck(v: Array, threshold: float, random: np.random.Generator) -> Array:
-    """Friction that rises from its Coulomb value below a speed, with noise."""
+    """Noisy friction that rises from its Coulomb value below a threshold speed."""
     rise = 3.0 * np.maximum(1 - np.abs(v) / threshold, 0.0) if threshold else 0.0
     return np.asarray(np.sign(v) * (6.0 + rise) + 4.0 * v + 0.2 + random.normal(0.0, 0.2, v.shape))
 
 
 @pytest.mark.parametrize("true", [0.0, 0.05, 0.1, 0.2])
 def test_the_threshold_velocity_of_friction(true: float) -> None:
-    """Vuong: where the rise is no longer seen above 5 % of Coulomb friction; 0 without a rise."""
+    """Vuong: the threshold is the speed at which the rise falls below 5 % of Coulomb friction; it
+    is 0 without a rise.
+    """
     random = np.random.default_rng(3)
     v = np.concatenate([random.uniform(-2, 2, 20_000), random.uniform(-0.3, 0.3, 20_000)])
     found = velocity_threshold(v, stribeck(v, true, random))

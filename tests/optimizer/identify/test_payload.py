@@ -1,4 +1,4 @@
-"""The payload of an arm from a log without it and one with it, where the truth is known."""
+"""The payload of an arm from a log without it and one with it, for known true values."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ NOISE = Noise(current=0.1)
 
 
 def log_of(carried: Payload, seed: int, said: Payload, motions: int = 0) -> Log:
-    """A log of a unit with other friction than the robot's own, which carried one payload and says
-    another.
+    """A log of a unit with other friction than the robot's own; the carried and the stated payload
+    differ.
     """
     truth = replace(truth_of(ROBOT, seed), payload=carried)
     log = recorded(ROBOT, truth, moves=12, seed=motions, noise=NOISE).log()
@@ -50,12 +50,12 @@ def check(carried: IdentifiedPayload, mass: float = PAYLOAD.mass) -> None:
 
 @pytest.mark.parametrize("seed", long_but([0], [0, 1]))
 def test_mass_and_centre_of_mass_are_found(seed: int) -> None:
-    """In other motions than those of the log without the payload."""
+    """The motions differ from the motions of the log without the payload."""
     check(found_in(log_of(NOTHING, seed, NOTHING, seed), log_of(PAYLOAD, seed, PAYLOAD, seed + 50)))
 
 
 def test_errors_of_the_links_do_not_become_payload() -> None:
-    """Of a robot whose links are taken to weigh up to 5 % more or less than they do."""
+    """The true link masses differ from the robot's figures by up to 5 %."""
     scale = np.array([1.05, 0.95, 1.04, 0.96, 1.05, 0.95])
     model = ROBOT.loaded_model(
         0.0, np.zeros(3), np.zeros((3, 3)), np.array([0.0, 0.0, -9.81]), scale
@@ -68,7 +68,7 @@ def test_errors_of_the_links_do_not_become_payload() -> None:
 
 @pytest.mark.long
 def test_torque_constants_that_differ_make_the_mass_less_certain() -> None:
-    """Of joints whose motors give up to 4 % more or less torque than the robot's figures say."""
+    """The true motor torques differ from the robot's figures by up to 4 %."""
     wrong = np.array([1.0, 1.04, 0.97, 1.03, 1.0, 1.0])
     off, certain = (
         list[float](),
@@ -113,7 +113,7 @@ def test_a_payload_needs_two_logs_that_differ_by_it() -> None:
 
 
 def turned(log: Log) -> Log:
-    """The log of an arm that turns about its upright axis alone, where no weight acts."""
+    """The log of an arm turning about its upright axis alone, without any torque of weight."""
     first = np.arange(ROBOT.nq) == 0
     motion = {name: np.where(first, getattr(log, name), 0.0) for name in ("q", "v", "a")}
     return replace(log, **motion, effort=np.where(first, np.asarray(log.effort), 0.01))
@@ -122,7 +122,7 @@ def turned(log: Log) -> Log:
 @pytest.mark.long
 @pytest.mark.parametrize("seed", long_but([0], [0, 1]))
 def test_nothing_carried_is_found_with_its_deviation(seed: int) -> None:
-    """Whether the last log says so or not, and where the others carried something, too."""
+    """Either log may state a payload; the flange of the examined log is empty."""
     without = log_of(NOTHING, seed, NOTHING)
     pairs = (
         [without, log_of(NOTHING, seed, PAYLOAD, 9)],
@@ -148,7 +148,7 @@ def test_a_payload_that_is_not_told_is_none_and_the_rest_is_found() -> None:
 
 @pytest.mark.long
 def test_held_out_motions_are_predicted_with_the_payload() -> None:
-    """It is found without them: with what the log says, the errors are far larger."""
+    """Without the fitted payload, the torque errors of the held-out motions are far larger."""
     logs = [log_of(NOTHING, 0, NOTHING), log_of(PAYLOAD, 0, NOTHING, 50)]
     better, worse = (
         torque_errors(identify(ROBOT, logs, IdentificationOptions(fit=each)).validation)[0]

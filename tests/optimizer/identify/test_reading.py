@@ -1,4 +1,4 @@
-"""Logs of every form become the same arrays, and broken ones name what is wrong."""
+"""Logs of every form become the same arrays; errors of broken logs name the fault."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ TRUTH = truth_of(ROBOT)
 ROUNDING = 1e-7
 # relative; of a product of two numbers in single precision
 SINGLE = 2e-7
-# of a slope: the knee of the true friction differs from that of the test regression
+# of a slope: the true friction and the test regression have different knees
 SLOPE = 0.1
 
 
@@ -113,8 +113,7 @@ def test_jitter_goes_onto_a_uniform_grid(recording: Recording) -> None:
     exact = recorded(ROBOT, TRUTH, moves=4, noise=SILENT)
     shift = np.append(0.0, random.uniform(-0.3, 0.3, len(exact.time) - 1) / exact.rate)
     times = exact.time + shift
-    # the arm goes on between the nominal times: positions and speeds as they are at the shifted
-    # ones
+    # the arm moves between the nominal times: positions and speeds at the shifted times
     q = exact.q + exact.v * shift[:, None] + exact.a * shift[:, None] ** 2 / 2
     moved = Recording(**{**exact.__dict__, "q": q, "v": exact.v + exact.a * shift[:, None]})
     reading = read_log(csv_of(moved, time=times + 1e6), ROBOT)
@@ -162,7 +161,7 @@ def _covers(log: Log) -> None:
 
 
 def _sine(rate: float, seconds: float) -> bytes:
-    """Joints that never rest, positions only."""
+    """Joints in constant motion, positions only."""
     t = np.arange(round(rate * seconds)) / rate
     q = np.sin(np.outer(t, [1.0, 1.3, 1.7, 2.1, 2.3, 2.9]))
     rows = [
@@ -191,7 +190,7 @@ def test_effort_tells_what_it_is(recording: Recording) -> None:
     assert slope["shoulder_lift_joint"] == pytest.approx(1 / K[1], rel=SLOPE)
     assert slope["elbow_joint"] == pytest.approx(1 / K[2], rel=SLOPE)
     assert read_log(torque, ROBOT).log.effort_meaning == "torque"
-    # what a column is called counts less than what is in it
+    # the contents of a column count more than its name
     wrong = read_log(torque.replace(b"tau", b"i"), ROBOT)
     assert wrong.log.effort_meaning == "torque" and any(
         "current" in each for each in wrong.report.warnings
@@ -253,7 +252,7 @@ def test_oddities_are_reported(recording: Recording) -> None:
     assert reading.report.dropped == 1
     words = " ".join(reading.report.warnings)
     assert "Gaps in the log: 1," in words and "row before: 1." in words and "No payload" in words
-    # two rests are two parts, with the hole between them
+    # two rests are two parts, separated by the gap
     assert any(
         after.start > before.end
         for before, after in zip(reading.log.moves, reading.log.moves[1:], strict=False)
@@ -317,7 +316,7 @@ def broken_cells(recording: Recording) -> dict[str, Case]:
 
 
 def broken_tables(recording: Recording) -> dict[str, Case]:
-    """Files with a broken header, or with rows that are no log."""
+    """Files with a broken header, or with rows of other data."""
     good = csv_of(recording, without="vaP")
     lines = good.splitlines()
     return {

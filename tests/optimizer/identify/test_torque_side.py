@@ -1,4 +1,4 @@
-"""Torques that were measured at the motors or behind the gears, of arms whose figures are known."""
+"""Torques measured at the motors or behind the gears, of arms with known parameters."""
 
 from __future__ import annotations
 
@@ -38,18 +38,17 @@ from tests.selection import long_but
 PANDA = load_robot("panda")
 # N·m of the bearings and the reading at rest of torque sensors behind the gears
 BEARING, OFFSET = 0.3, 0.4
-# % of the energy of a move, from six moves without noise: the power of four moves tells the
-# friction of the drives, which torques behind the gears do not show
+# % of the energy of a move, from six moves without noise: the power of four moves determines the
+# friction of the drives, invisible to torques behind the gears
 NOISE_FREE = 5.0
-# kg, of links that weigh more than the robot's own
+# mass of the links over the robot's own
 HEAVIER = 1.1
 
 
 def behind_the_gears(
     robot: Robot, truth: Truth, recording: Recording, gain: Array | float = 0.0
 ) -> Log:
-    """The recording with torques as sensors behind the gears measure them, which read too much by
-    the share `gain` (nq,)."""
+    """The recording with torques of sensors behind the gears, with relative errors `gain` (nq,)."""
     random, noise = np.random.default_rng(0), 0.02
     rigid = rigid_torques(robot, truth, recording.q, recording.v, recording.a)
     seen = (1 + gain) * rigid + BEARING * np.tanh(recording.v / 0.01) + OFFSET
@@ -59,7 +58,7 @@ def behind_the_gears(
 
 @pytest.fixture(scope="module")
 def heavier() -> tuple[Robot, Log]:
-    """A Panda whose links weigh a tenth more than the robot's own, and its log."""
+    """A Panda with links a tenth heavier than the robot's own, and its log."""
     none = np.zeros((3, 3))
     scale = np.full(PANDA.nq, HEAVIER)
     real = replace(PANDA, model=PANDA.loaded_model(0.0, none[0], none, GRAVITY, scale))

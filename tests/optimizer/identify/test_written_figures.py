@@ -1,4 +1,4 @@
-"""Figures that are written into a document and read again are those of the fit."""
+"""Figures written into a document and read again equal the figures of the fit."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ CURVED: tuple[Term, ...] = ("coulomb", "viscous", "curved", "load", "offset")
 
 
 def log_of(robot: Robot = ROBOT, bend: float = 0.3, still: int | None = 5, **parts: Any) -> Log:
-    """A log of a unit whose friction is curved, with a joint that hardly moves."""
+    """A log of a unit with curved friction and a joint that hardly moves."""
     truth = truth_of(robot, 4)
     recording: Recording = recorded(robot, truth, moves=10, seed=4)
     curve = truth.coulomb * np.arcsinh(recording.exact_v / bend)
@@ -132,7 +132,9 @@ def test_equations_of_joints_that_keep_other_terms_are_those_without_their_torqu
     ),
 )
 def test_figures_beside_earlier_ones_are_written_as_fitted(options: dict[str, Any]) -> None:
-    """What a later log does not change is that of the earlier logs, not of the robot's maker."""
+    """Figures unchanged by a later log keep the values of the earlier logs, instead of the maker's
+    values.
+    """
     log = log_of()
     first = identify(ROBOT, [log], IdentificationOptions(terms=CURVED, held_out=0.0))
     check(identify(written(first), [log], IdentificationOptions(held_out=0.0, **options)), log)
@@ -162,7 +164,7 @@ def test_methods_without_links_write_the_other_figures_as_they_were_fitted(
     torque = rigid_torques(ROBOT.model, rows.q, rows.v, rows.a)
     torque = torque + robot.drives.rotor_inertia * rows.a
     energy = breakdown(rows.weight, rows.v, rows.a, torque, 0.0, Arm(robot=robot))
-    # of the base parameters, which the log does not determine exactly
+    # a tolerance for base parameters, which the log determines only approximately
     assert energy.electrical.total == pytest.approx(arm.energy(rows), rel=2e-3)
 
 
@@ -248,7 +250,7 @@ def test_figures_of_any_options_are_written_as_they_were_fitted(
 
 
 def test_losses_that_the_power_does_not_separate_are_not_counted_twice() -> None:
-    """Of a robot whose inverters have constant and quadratic losses of their own."""
+    """The robot's inverters have constant and quadratic losses of their own."""
     nq = ROBOT.nq
     drives = replace(
         ROBOT.drives, inverter_constant=np.full(nq, 2.0), inverter_quadratic=np.full(nq, 0.05)
@@ -295,7 +297,7 @@ def test_nothing_is_written_of_what_stays_the_robots_own() -> None:
 def test_a_rotor_at_its_bound_stays_there_with_a_warning_if_the_log_rejects_the_robots_own() -> (
     None
 ):
-    """Of an arm without rotors, whose robot has them: the noise drives the fit below 0."""
+    """The arm has no rotors, the robot has some: noise drives the fit below 0."""
     truth = replace(truth_of(ROBOT), rotor_inertia=np.full(ROBOT.nq, -0.02))
     log = replace(recorded(ROBOT, truth, moves=14).log(), power=None)
     for options in ({}, {"refit": True}):

@@ -1,4 +1,4 @@
-"""Spline spaces: what they reproduce, where their knots lie, and that motions rest at both ends."""
+"""Spline spaces reproduce polynomials, place their knots at the switches, and rest at both ends."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ EXACT = 1e-11  # a few dozen operations in double precision, on basis functions 
 # absolute, times (points per unit)^d: differentiating d times multiplies rounding by the inverse of
 # a span's length
 DERIVATIVE = 1e-11
-# relative to a speed's or acceleration's own peak; the grid's points are a hundredth of the time
-# apart at most, so a parabola's top lies above the nearest of them by less than (1/200)² · x'' / 2,
-# and x'' < 60 x for a spline of 8 spans
+# relative to the peak of a speed or acceleration; grid points are at most a hundredth of the time
+# apart, so the top of a parabola lies above the nearest one by less than (1/200)² · x'' / 2, and
+# x'' < 60 x for a spline of 8 spans
 GRID_MISS = 1e-3
 
 SWITCHES = np.array([0.05, 0.31, 0.4, 0.6, 0.69, 0.95])
@@ -46,8 +46,8 @@ def spans(space: Basis) -> Array:
 
 @pytest.mark.parametrize("power", range(DEGREE + 1))
 def test_polynomials_of_the_degree_are_reproduced(space: Basis, power: int) -> None:
-    """x^k has control points that interpolate it at the Greville points; its derivatives follow at
-    nodes and grid.
+    """x^k has control points that interpolate it at the Greville points; its derivatives agree at
+    the nodes and on the grid.
     """
     x = bspline.greville(space.knots)
     points = np.linalg.solve(bspline.basis_matrix(space.knots, x), x**power)
@@ -63,7 +63,7 @@ def test_polynomials_of_the_degree_are_reproduced(space: Basis, power: int) -> N
 
 
 def grid_points(space: Basis) -> Array:
-    """Where the grid's points lie: where the derivative of x²/2 says they do."""
+    """Positions of the grid points, read from the derivative of x²/2."""
     x = bspline.greville(space.knots)
     points = np.linalg.solve(bspline.basis_matrix(space.knots, x), x**2 / 2)
     return np.asarray(space.at_grid[0] @ points)
@@ -79,8 +79,8 @@ def test_the_quintic_is_in_every_space(space: Basis) -> None:
 
 
 def test_motions_rest_at_both_ends(space: Basis) -> None:
-    """Whatever the free control points, three that coincide at an end leave neither speed nor
-    acceleration there.
+    """Three equal control points at an end leave no speed or acceleration there, for any free
+    control points.
     """
     rng = np.random.default_rng(1)
     points = np.full(space.n, 0.3)
@@ -140,8 +140,8 @@ def test_the_grid_finds_peaks(space: Basis) -> None:
 
 
 def test_anchors_hold_the_ends_of_every_span(space: Basis) -> None:
-    """And points evenly in between, so that a derivative cannot leave its limit along a whole span
-    unnoticed.
+    """Further anchors lie evenly in between, so a derivative cannot exceed its limit along a whole
+    span unnoticed.
     """
     grid = grid_points(space)
     edges = np.unique(space.knots)
@@ -166,15 +166,15 @@ def test_graded_knots(repeat: int) -> None:
 
 
 def test_switches_at_the_ends_make_no_knots() -> None:
-    """A knot within a thousandth of an end would make a span in which nothing can happen."""
+    """A knot within a thousandth of an end would make a span too short for any motion."""
     space = bspline.graded(np.array([0.0, 1e-4, 0.5, 1 - 1e-4, 1.0]), 3)
     assert spans(space).min() > 1e-3
 
 
 @pytest.mark.parametrize("repeat", [2, 3])
 def test_moved_knots_follow_the_switches(repeat: int) -> None:
-    """The others keep their places between them, and with the same control points the motion hardly
-    changes.
+    """The other knots keep their relative places, and the same control points give nearly the same
+    motion.
     """
     space, by = bspline.graded(SWITCHES, repeat), 1e-3
     fewer = np.append(1e-4, SWITCHES[1:])
@@ -213,8 +213,8 @@ def test_refit_is_exact_on_a_refinement(space: Basis) -> None:
 
 
 def test_fit_is_the_nearest_motion_at_rest() -> None:
-    """Samples of a motion that is not at rest: the fit keeps the ends and rests there, and no other
-    comes closer.
+    """For samples of a motion without rest, the fit keeps the end positions and rests there, and no
+    other such spline is nearer.
     """
     space = bspline.uniform(13)
     t = np.linspace(0.0, 1.0, 201)
@@ -233,8 +233,8 @@ def test_fit_is_the_nearest_motion_at_rest() -> None:
 
 
 def test_a_smooth_fit_keeps_positions_and_jerk_where_knots_are_repeated() -> None:
-    """Switches so near to the ends that no sample lies between: a fit to the positions alone has
-    any jerk there.
+    """No sample lies between switches this near to the ends: a fit to positions alone leaves the
+    jerk there arbitrary.
     """
     switches = np.array([0.002, 0.3, 0.302, 0.698, 0.7, 0.998])
     space = bspline.graded(switches, 3)
@@ -274,7 +274,7 @@ COUNT = 13
 
 
 def switches(duration: float, speed: float = 0.1) -> np.ndarray:
-    """Of a joint that travels 2 rad."""
+    """Switches of a joint with a travel of 2 rad."""
     way = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 2.0])
     return seven_segment.switches(way, duration, limits(v_max=speed), RAMPS.closest_switches)
 
@@ -282,7 +282,9 @@ def switches(duration: float, speed: float = 0.1) -> np.ndarray:
 @pytest.mark.parametrize("repeat", [1, 2, 3])
 @pytest.mark.parametrize("duration", [20.1, 60.0, 600.0])
 def test_spans_grow_from_the_ramps(duration: float, repeat: int) -> None:
-    """None is more than three times its neighbour, or wider than those of evenly spaced knots."""
+    """No span is more than three times its neighbour, or wider than evenly spaced knots would make
+    it.
+    """
     space = RAMPS.space(switches(duration), repeat, COUNT)
     breaks, counts = np.unique(space.knots, return_counts=True)
     lengths = np.diff(breaks)
@@ -305,7 +307,7 @@ def test_no_ramp_is_too_short_for_a_knot() -> None:
 def test_a_refined_space_holds_every_motion_of_the_first(repeat: int) -> None:
     at = switches(20.1)
     first = RAMPS.space(at, 1, COUNT)
-    # the motion that was found may last a little longer
+    # the motion found may last slightly longer
     finer = RAMPS.refined(first.knots, np.where(at < 0.5, 0.99 * at, 1 - 0.99 * (1 - at)), repeat)
     points = np.random.default_rng(0).uniform(-1, 1, (first.n, 2))
     again = bspline.refit(points, first.knots, finer.knots)

@@ -1,4 +1,4 @@
-"""Where compiled libraries are kept, and which of them leave."""
+"""The folder of compiled libraries, and the removal of the longest unused ones."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_the_cache_is_where_the_user_says_or_at_home(
 def test_libraries_that_rested_longest_leave(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of many arms that users bring; a library in use is marked, and stays."""
+    """Many users bring arms of their own; a library in use is marked and stays."""
     monkeypatch.setattr(library_cache, "CACHE", replace(library_cache.CACHE, max_libraries=3))
     for k in range(5):
         for ending in (".so", ".sha256", ".lock"):
@@ -54,7 +54,7 @@ def test_libraries_that_rested_longest_leave(
     library_cache._prune(tmp_path)
     assert sorted(path.name for path in tmp_path.glob("*.so")) == ["arm0.so", "arm3.so", "arm4.so"]
     assert len(list(tmp_path.iterdir())) == 9
-    # a folder that is gone is no error
+    # a missing folder is no error
     mark_used(tmp_path / "none" / "arm.so")
     library_cache._prune(tmp_path / "none")
 
@@ -78,7 +78,7 @@ def test_several_processes_make_one_library(tmp_path: Path) -> None:
 
 @pytest.fixture
 def hung(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The file with the ids of a compiler that hangs, and of the process that it has started."""
+    """The file with the ids of a hanging compiler and of its child process."""
     compiler, ids = tmp_path / "compiler", tmp_path / "ids"
     compiler.write_text(f"#!/bin/sh\nsleep 1000 &\necho $$ $! >> {ids}\nwait\n", encoding="utf-8")
     compiler.chmod(0o755)
@@ -87,7 +87,7 @@ def hung(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def is_there(process: str) -> bool:
-    """Whether it runs: what was killed may stay for its parent to ask about."""
+    """Whether the process runs: a killed one may remain until its parent reads the exit code."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -118,7 +118,9 @@ def test_a_compiler_that_hangs_is_killed_with_all_that_it_started(
 def test_temporary_files_of_a_compiler_go_with_its_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A compiler that is killed leaves them, and so does a process with the folder of its work."""
+    """A killed compiler leaves temporary files, and so does a killed process with its working
+    folder.
+    """
     compiler, names = tmp_path / "compiler", tmp_path / "names"
     compiler.write_text(f"#!/bin/sh\nmktemp >> {names}\nexit 1\n", encoding="utf-8")
     compiler.chmod(0o755)

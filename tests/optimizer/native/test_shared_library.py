@@ -1,6 +1,4 @@
-"""The C library that all arms share: how it is compiled and loaded, and the frames that it
-computes.
-"""
+"""The C library shared by all arms: compilation, loading, and the computed frames."""
 
 from __future__ import annotations
 
@@ -61,7 +59,7 @@ def sources(tmp_path: Path) -> Path:
 
 
 def test_one_of_other_sources_is_never_called(sources: Path) -> None:
-    """Whatever C file has changed: a structure of it may have another layout."""
+    """After a change of any C file, a structure may have another layout."""
     with (sources / "vectors.c").open("a", encoding="utf-8") as file:
         file.write("/* changed */\n")
     with pytest.raises(LibraryUnusable, match="was compiled from other sources"):
@@ -70,7 +68,7 @@ def test_one_of_other_sources_is_never_called(sources: Path) -> None:
 
 @pytest.mark.long
 def test_a_clone_that_was_not_set_up_cannot_be_imported(tmp_path: Path) -> None:
-    """The error is that of the library, and what it says to do helps."""
+    """The error is the library's own, and its remedy helps."""
     library = build.__name__.removesuffix(".native.build")
     for package in {library.partition(".")[0], load_robot.__module__.partition(".")[0]}:
         spec = find_spec(package)
@@ -96,8 +94,8 @@ def test_a_clone_that_was_not_set_up_cannot_be_imported(tmp_path: Path) -> None:
 
 
 def test_it_is_compiled_for_every_processor_of_its_kind(tmp_path: Path) -> None:
-    """No result depends on the processor: what was compiled for this one gives the same frames, to
-    the last bit.
+    """No result depends on the processor: the library compiled for this processor gives bitwise
+    equal frames.
     """
     compiler = build.compiler()
     assert compiler is not None
@@ -116,7 +114,7 @@ def test_it_is_compiled_for_every_processor_of_its_kind(tmp_path: Path) -> None:
 def test_a_compiler_that_fails_is_told_with_its_remedy(
     tmp_path: Path, sources: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What was there before stays."""
+    """The earlier library stays."""
     (sources / LIBRARY.name).write_bytes(b"before")
     there = set(sources.iterdir())
     monkeypatch.setattr(build, "find_spec", lambda _: None)
@@ -141,7 +139,7 @@ def frames_by_numpy(placements: Array, q: Array) -> Array:
     x, y = placements[..., 0], placements[..., 1]
     frames = np.empty((len(q), q.shape[1] + 1, 4, 4))
     frames[:, 0] = np.eye(4)
-    # each joint's placement, turned about its z axis
+    # placements of all joints, turned about their z axes
     steps = np.empty((*q.shape, 4, 4))
     steps[..., 0], steps[..., 1] = c * x + s * y, c * y - s * x
     steps[..., 2:] = placements[..., 2:]
@@ -152,9 +150,7 @@ def frames_by_numpy(placements: Array, q: Array) -> Array:
 
 @pytest.mark.parametrize("name", robot_names())
 def test_frames_are_those_of_numpy(name: str) -> None:
-    """Also of no configuration, of some joints alone, and of arrays whose numbers do not lie one
-    after the other.
-    """
+    """Also for zero configurations, for some joints alone, and for non-contiguous arrays."""
     robot = load_robot(name)
     placements = joint_placements(robot.model)
     q = np.random.default_rng(4).uniform(-7, 7, (robot.nq, 200)).T
