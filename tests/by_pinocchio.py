@@ -1,4 +1,4 @@
-"""Values of an arm by Pinocchio alone, which tests compare with."""
+"""Values of an arm by Pinocchio alone, for comparison."""
 
 from __future__ import annotations
 

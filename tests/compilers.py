@@ -1,4 +1,4 @@
-"""Which tests have a C compiler: those of what it makes."""
+"""The choice of tests with a C compiler: only the tests of its products."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ FOUND = os.environ.get("CC")
 
 @contextmanager
 def without_compiler() -> Iterator[None]:
-    """Kernels that are not in the cache are interpreted, also in services: the few motions of a
-    test take less time than the compiler, which needs 5 to 12 s for a kernel."""
+    """Kernels missing from the cache are interpreted, also in services.
+
+    The few motions of a test take less time than the compiler, which needs 5 to 12 s for a kernel.
+    """
     with pytest.MonkeyPatch.context() as patched:
         patched.setenv("CC", "")
         yield
@@ -23,7 +25,7 @@ def without_compiler() -> Iterator[None]:
 
 @contextmanager
 def with_compiler() -> Iterator[None]:
-    """The compiler of this machine, or the one that `make` has installed."""
+    """The compiler of this machine, or the one installed by `make`."""
     with pytest.MonkeyPatch.context() as patched:
         if FOUND is None:
             patched.delenv("CC", raising=False)

@@ -1,6 +1,4 @@
-"""How many processes run the tests, which files they begin with, which folders `make test-long`
-alone runs; a database for each test, and the service in this process for all.
-"""
+"""The setting of all tests: number of processes, order of the files, databases and the service."""
 
 from __future__ import annotations
 
@@ -42,8 +40,11 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Skips the long folders where long tests are deselected, and the tests that need rclpy where
-    it is not installed: `test_ros2.py` runs them. None leaves the decision to pytest."""
+    """Skips the long folders where long tests are deselected, and the node's tests without rclpy.
+
+    `test_ros2.py` runs the tests of the node in an environment with rclpy. None leaves the decision
+    to pytest.
+    """
     is_long = collection_path in LONG_FOLDERS and config.option.markexpr == "not long"
     needs_ros = collection_path == TESTS / "ros2" and find_spec("rclpy") is None
     return True if is_long or needs_ros else None
@@ -51,9 +52,11 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Marks the tests of the long folders, and puts the few tests that take long to the front: at
-    the end, one process would be busy with them while the others idle. Long tests may hang for
-    longer before they fail: some take minutes on an idle machine."""
+    """Marks the tests of the long folders and moves the slowest tests to the front.
+
+    At the end of the run, one process would be busy with a slow test while the others idle. Long
+    tests have a longer timeout: some take minutes on an idle machine.
+    """
     folders = tuple(f"{folder}/" for folder in LONG_FOLDERS)
     for item in items:
         if str(item.path).startswith(folders):
@@ -65,21 +68,26 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Iterator[None]:
-    """Modules and tests stay until the end: the garbage collector takes a fifth of the time that it
-    takes to load them, and need not look at them afterwards."""
+    """Keeps the garbage collector away from modules and tests, which live until the end.
+
+    To look at them takes the collector a fifth of the time of loading.
+    """
     gc.disable()
     try:
         return (yield)
     finally:
         gc.freeze()
         gc.enable()
-        # at the exit, where libraries warn of objects that nobody could free
+        # Objects are freed again at the exit, lest libraries warn of leaks.
         atexit.register(gc.unfreeze)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Makes what all processes that run tests share: a folder, and the process whose forks are the
-    programs under test, which loads the package while the others load the tests."""
+    """Makes the folder and the forking process of all processes with tests.
+
+    Programs under test are forks of this process. It loads the package while the others load the
+    tests.
+    """
     os.environ.setdefault("PYTEST_SHARED_FOLDER", DATABASES.name)
     if config.getoption("numprocesses", None):
         start_origin()
@@ -91,8 +99,7 @@ def pytest_unconfigure() -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Gives each test a database of its own, also for the commands and programs that it starts: not
-    the user's, and none that another test has written to."""
+    """Gives each test an empty database of its own, also for its commands and programs."""
     os.environ["JOULEPATH_DATABASE_URL"] = f"sqlite:///{DATABASES.name}/{next(_count)}.db"
 
 
@@ -104,8 +111,10 @@ def _without_compiler() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _forked_workers(_without_compiler: None) -> None:
-    """Workers of services in this process are forks of it as it is before the first test: nothing
-    is imported for them again, and nothing that a test has changed is in them."""
+    """Forks the workers of services from this process in its state before the first test.
+
+    Workers import nothing again and have no traces of a test.
+    """
     fork_forkserver()
     if engine := sys.modules.get("joulepath.app.engine.forkserver"):
         engine.start_forkserver()
@@ -113,7 +122,7 @@ def _forked_workers(_without_compiler: None) -> None:
 
 @pytest.fixture
 def compiler() -> Iterator[None]:
-    """For tests of what the C compiler makes."""
+    """The C compiler, which the other tests do without."""
     with with_compiler():
         yield
 

@@ -1,5 +1,4 @@
-"""Logs of simulated motions whose true figures are known, with noise, as arrays, as `Log` and as
-CSV.
+"""Logs of simulated motions with known true figures and noise, as arrays, `Log` and CSV.
 
 Torques come from Pinocchio's recursion and the formulas below, not from the code under test.
 """
@@ -65,8 +64,8 @@ class Truth:
 
 
 def truth_of(robot: Robot, seed: int = 0, payload: Payload | None = None) -> Truth:
-    """A unit of the robot whose figures differ from the robot's own by some ten per cent, and has
-    load friction.
+    """A unit of the robot with figures some ten per cent off the robot's own, and with load
+    friction.
     """
     random = np.random.default_rng(seed)
     drives, law, nq = robot.drives, robot.friction, robot.nq
@@ -92,9 +91,11 @@ def truth_of(robot: Robot, seed: int = 0, payload: Payload | None = None) -> Tru
 
 @dataclass(frozen=True)
 class Recording:
-    """What a controller records: times (n,) [s], q, v, a, current, torque, temperature (n, nq),
-    power (n,), and the row ranges of its moves. v, current and power have noise, `exact_*` has
-    none."""
+    """The record of a controller.
+
+    Times (n,) [s], q, v, a, current, torque, temperature (n, nq), power (n,), and the row ranges of
+    its moves. v, current and power have noise, `exact_*` has none.
+    """
 
     robot: Robot
     rate: float
@@ -140,9 +141,11 @@ def recorded(
     closed: bool = False,
     cycles: int = 1,
 ) -> Recording:
-    """Random motions from rest to rest, half a second of rest before, between and after them. The
-    first two lead from one end to another and back: the same motion twice, in both directions. If
-    `closed`, the last one ends where the first one began, and all are repeated in `cycles`."""
+    """Random motions from rest to rest, half a second of rest before, between and after them.
+
+    The first two lead from one end to another and back: the same motion twice, in both directions.
+    If `closed`, the last one ends at the start of the first, and all are repeated in `cycles`.
+    """
     random = np.random.default_rng(seed)
     q, v, a, ranges = _motions(robot, moves, rate, random, closed, cycles)
     tau_rigid = rigid_torques(robot, truth, q, v, a)
@@ -255,9 +258,11 @@ def csv_of(
     units: Literal["rad", "deg"] = "rad",
     first: int = 0,
 ) -> bytes:
-    """The recording as a CSV file of one of the three forms. `without`: groups that are left out,
-    some of `v`, `a`, `i`, `P`, `T`. `time` replaces the times; `first` is the number of the first
-    joint of an RTDE header."""
+    """The recording as a CSV file of one of the three forms.
+
+    `without` names groups to leave out, some of `v`, `a`, `i`, `P`, `T`. `time` replaces the times;
+    `first` is the number of the first joint of an RTDE header.
+    """
     nq, scale = recording.robot.nq, 180 / np.pi if units == "deg" else 1.0
     stamps = recording.time if time is None else time
     numbers = range(first, nq + first) if form == "rtde" else range(1, nq + 1)
@@ -311,7 +316,7 @@ def with_current(recording: Recording, current: Array) -> Recording:
 
 
 def written(found: Identification) -> Robot:
-    """The robot with the figures of the document, as a file holds them."""
+    """The robot with the figures of the document, as in a file."""
     document = json.loads(json.dumps(found.document("2026-01-31"), allow_nan=False))
     return load_robot(found.robot.name, figures=document)
 
@@ -329,8 +334,8 @@ def power_errors(found: Validation | None) -> tuple[PowerErrors, PowerErrors]:
 
 
 def off_the_model(log: Log, effect: float, seed: int) -> Log:
-    """The log with a power of its own in each move: normal, with a standard deviation of `effect`
-    [W].
+    """The log with an extra power in every move: normal, with a standard deviation of
+    `effect` [W].
     """
     random, power = np.random.default_rng([seed, 1]), np.array(log.power)
     for move in log.moves:

@@ -1,4 +1,4 @@
-"""Links whose inertia belongs to no body, as some makers publish them."""
+"""Links with an inertia impossible for any body, as published by some makers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TENSOR = np.array(
 
 
 def with_impossible_link(robot: Robot) -> Robot:
-    """The robot with an inertia of link 4 that no body has."""
+    """The robot with an inertia of link 4 impossible for any body."""
     model = robot.model.copy()
     body = model.inertias[LINK]
     model.inertias[LINK] = pin.Inertia(body.mass, body.lever, TENSOR)

@@ -1,4 +1,4 @@
-"""Requests that the library refuses."""
+"""Requests refused by the library."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from joulepath.optimizer.exceptions import InvalidProblem
 
 @contextmanager
 def refusal_of(field: str, match: str | None = None) -> Iterator[None]:
-    """An InvalidProblem that names a field, and has some words."""
+    """An InvalidProblem with the name of a field and some words."""
     with pytest.raises(InvalidProblem, match=match) as refusal:
         yield
     assert refusal.value.field == field

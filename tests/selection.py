@@ -1,4 +1,4 @@
-"""Which parameters of a test every run tries, and which `make test-long` alone."""
+"""The choice of parameters for every run and for `make test-long` alone."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 
 
 def long_but(quick: Collection[Any], values: Iterable[Any]) -> list[Any]:
-    """The values, or tuples of values, as parameters of a test: those in `quick` as they are, the
-    others `long`.
+    """The values, or tuples of values, as parameters of a test: all but the `quick` ones are
+    `long`.
     """
     found = list(values)
     assert all(each in found for each in quick), "a quick parameter is none of the test's"

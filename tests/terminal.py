@@ -1,4 +1,4 @@
-"""A process on a terminal, and what the terminal shows of it."""
+"""A process on a terminal, and the output shown there."""
 
 from __future__ import annotations
 

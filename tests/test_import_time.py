@@ -1,4 +1,4 @@
-"""What a process imports before its first use: each of these packages takes 0.1 s or more."""
+"""Imports of a process before its first use: each of these packages takes 0.1 s or more."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The scripts in examples/library run, and what they print is true of the library's promises."""
+"""The scripts in examples/library run, and their output keeps the promises of the library."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ import pytest
 FOLDER = Path(__file__).parents[1] / "examples" / "library"
 # energies are printed with one digit [J]
 ROUNDED = 0.1
-# of the certificate's ratios, as it allows them, and of four printed digits
+# tolerance of the certificate's ratios, and of four printed digits
 RATIO = 1 + 1e-6 + 5e-5
 
 
 @pytest.fixture
 def printed(request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]) -> str:
-    """What the script of the test's parameter prints."""
+    """The output of the script in the test's parameter."""
     runpy.run_path(str(FOLDER / f"{request.param}.py"), run_name="__main__")
     return capsys.readouterr().out
 
 
 def number(pattern: str, text: str) -> float:
-    """The number that the group of a pattern matches."""
+    """The number in the group of a pattern."""
     found = re.search(pattern, text)
     assert found, text
     return float(found[1])
@@ -82,7 +82,7 @@ def test_pareto_front(
 
 @pytest.mark.long
 def test_many_moves() -> None:
-    """As a user runs it: the processes that it starts import the script."""
+    """The script is run as by a user: its child processes import it."""
     name = "many_moves"
     told = subprocess.run(
         [sys.executable, "-m", f"examples.library.{name}"],

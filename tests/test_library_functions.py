@@ -137,7 +137,7 @@ def test_plan_cycle() -> None:
 
 
 def test_inverse_kinematics() -> None:
-    """The goal of an optimised motion is among the solutions; a scene says which collide."""
+    """The goal of an optimised motion is among the solutions; a scene marks colliding solutions."""
     pose = joulepath.Pose.from_rotvec([0.4, -0.2, 0.3], [np.pi, 0.0, 0.0])
     arm = problem().arm
     found = joulepath.inverse_kinematics(arm, pose)
@@ -160,7 +160,7 @@ def test_inverse_kinematics() -> None:
 
 
 def test_what_is_too_late_says_so() -> None:
-    """By a clock whose every look is a second later than the last one."""
+    """The clock gains a second at every reading, so the deadline passes."""
     late = {"clock": CountingClock()}
     pose = joulepath.Pose.from_rotvec([0.5, 0.1, 0.4], [np.pi, 0.0, 0.0])
     with pytest.raises(joulepath.DeadlineExceeded):
@@ -181,7 +181,8 @@ def test_replay() -> None:
     run = found.under("feed_forward")
     assert electrical(run.energy) == pytest.approx(electrical(solution().energy), rel=5e-3)
     assert not run.collides
-    # those within the limits that take as long, in front of all the straight one
+    # solutions within the limits with the same duration, all of them in front of the straight
+    # motion
     names = {each.name for each in found.savings}
     assert {"ruckig_slowed", "straight"} <= names <= {each.name for each in solution().baselines}
     for each in found.savings:

@@ -20,7 +20,7 @@ COMMAND = f'joulepath() {{ "{sys.executable}" -m joulepath.app.cli "$@"; }}\nset
 
 
 def blocks(page: str, language: str) -> list[str]:
-    """The blocks of code that are to be run."""
+    """The blocks of code of a page to run."""
     text = (DOCS / page).read_text(encoding="utf-8")
     found = re.findall(r"^```([^\n]*)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
     return [code for kind, code in found if kind == language]
@@ -56,7 +56,7 @@ def test_the_command_line_page(tmp_path: Path) -> None:
 
 
 def test_the_reference_has_every_public_name() -> None:
-    """By the module that `joulepath` takes it from; errors have a page of their own."""
+    """Names stand under their module in `joulepath`; errors have a page of their own."""
     text = (DOCS / "api.md").read_text(encoding="utf-8")
     shown = [path.rpartition(".") for path in re.findall(r"^::: (\S+)$", text, re.MULTILINE)]
     named = {name for *_, name in shown}

@@ -249,7 +249,7 @@ def test_every_function_says_what_it_takes_returns_and_raises(name: str) -> None
 
 
 def test_one_except_clause_catches_every_error() -> None:
-    """But for those of a robot's files, which are wrong values to the interpreter, too."""
+    """All errors are a JoulepathError, except the errors of robot files, which are a ValueError."""
     of_files = {"InvalidArm", "InvalidFigures"}
     for name in ERRORS:
         base = ValueError if name in of_files else joulepath.JoulepathError
@@ -270,10 +270,10 @@ def subclasses(base: type) -> Iterator[type]:
 
 
 def test_the_types_of_arguments_are_public() -> None:
-    """All that a caller makes; what the library made before may have parts that are not."""
+    """Every type made by a caller is public; results of the library may have internal parts."""
     known = {getattr(joulepath, name) for name in TYPES}
     made = {joulepath.Robot, joulepath.Solution, joulepath.CycleSolution}
-    # a protocol of another package's class, and parts of paths that only the library divides
+    # a protocol for the class of another package, and sections of paths, made by the library alone
     internal = {"DaskClient", "Section"}
     todo = [each for name in FUNCTIONS for each in argument_types(getattr(joulepath, name))]
     seen = set[type]()
@@ -360,8 +360,10 @@ def test_the_import_loads_nothing() -> None:
 
 
 def test_the_library_needs_no_web_framework() -> None:
-    """With all names loaded, nothing of the service is but the client and the errors. Tasks, which
-    workers and the command line import, need the schemas alone."""
+    """With all names loaded, only the client and the errors of the service are loaded.
+
+    Tasks, imported by workers and the command line, need the schemas alone.
+    """
     code = """
 import sys, joulepath
 [getattr(joulepath, name) for name in joulepath.__all__ if name != "InvalidArm"]

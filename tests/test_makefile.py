@@ -1,6 +1,6 @@
-"""The set-up by make: one at a time, and whole after one that was cut short.
+"""The set-up by make: one at a time, and complete after an interrupted one.
 
-The real Makefile runs in a folder where Python is a script that writes down what it is asked for.
+The real Makefile runs in a folder whose Python is a script with a record of its arguments.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The reference pages and the page on own robots say what the service's OpenAPI document says."""
+"""The reference pages and the page on own robots agree with the service's OpenAPI document."""
 
 from __future__ import annotations
 

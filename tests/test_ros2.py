@@ -1,4 +1,4 @@
-"""The tests of the ROS 2 node, by the Python of an environment that has rclpy."""
+"""The tests of the ROS 2 node, by the Python of an environment with rclpy."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_the_node_in_an_environment_with_rclpy(only: str) -> None:
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "PYTHONPATH": str(ROOT),
     }
-    # variables of the surrounding run, which is another one
+    # variables of the surrounding run, which do not hold for this one
     for name in ("ADDOPTS", "FORKS", "SHARED_FOLDER", "XDIST_WORKER", "XDIST_WORKER_COUNT"):
         environment.pop(f"PYTEST_{name}", None)
     done = subprocess.run(

@@ -1,6 +1,4 @@
-"""The shape of the code: rooms that say what they are for, files and functions of a readable
-length, named floors.
-"""
+"""The shape of the code: named rooms and floors, files and functions of a readable length."""
 
 from __future__ import annotations
 
@@ -28,7 +26,7 @@ def sources() -> list[Path]:
 
 
 def all_sources() -> list[Path]:
-    """Those, and the tests, benchmarks, examples and scripts."""
+    """Every Python file of the three packages, the tests, benchmarks, examples and scripts."""
     others = ("tests", "benchmarks", "examples", "scripts")
     return [
         *sources(),
@@ -37,7 +35,7 @@ def all_sources() -> list[Path]:
 
 
 def rooms() -> list[Path]:
-    """Every folder of the three packages that holds Python files."""
+    """Every folder of the three packages with Python files."""
     return sorted({path.parent for path in sources()})
 
 
@@ -46,7 +44,7 @@ def name(path: Path) -> str:
 
 
 def contents(package: str) -> set[str]:
-    """The folders with Python files and the modules that one sees in a package."""
+    """The visible parts of a package: modules and folders with Python files."""
     folder = ROOT / package
     folders = {room.relative_to(folder).parts[0] for room in rooms() if folder in room.parents}
     return folders | {path.stem for path in folder.glob("*.py")} - {"__init__"}
@@ -91,7 +89,7 @@ def page_sources() -> list[Path]:
 
 
 def page_imports(path: Path) -> list[Path]:
-    """The files of the studio page that one of them imports, types included."""
+    """The files of the studio page imported by one of its files, types included."""
     found = []
     for target in _PAGE_IMPORT.findall(path.read_text()):
         stem = (path.parent / target).resolve()
@@ -147,7 +145,7 @@ def test_no_function_is_long() -> None:
 
 
 def statements(node: ast.AST) -> Iterator[ast.AST]:
-    """All statements within a node. Expressions, which are most of a tree, are not looked into."""
+    """All statements within a node; expressions, the larger part of a tree, are not searched."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.stmt | ast.excepthandler | ast.match_case):
             yield child
@@ -168,8 +166,7 @@ def functions(path: Path) -> Iterator[tuple[ast.FunctionDef | ast.AsyncFunctionD
 
 @pytest.mark.parametrize("package", STOREYED)
 def test_the_floors_name_exactly_what_there_is(package: str) -> None:
-    """A layer in parentheses may be absent; import-linter itself ignores one that does not
-    exist."""
+    """A layer in parentheses may be absent; import-linter itself ignores a missing layer."""
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"][
         "contracts"
     ]
@@ -199,7 +196,7 @@ _OPENS = re.compile(r"(?:_text|open|TemporaryFile)\(|\b(?:text|universal_newline
 
 
 def unencoded(path: Path) -> Iterator[str]:
-    """Where a file reads or writes text in whatever encoding the locale of the process has."""
+    """Places of a file with text read or written in the encoding of the locale."""
     text = path.read_text(encoding="utf-8")
     if not _OPENS.search(text):
         return  # few files do: to parse all takes seconds
@@ -211,7 +208,7 @@ def unencoded(path: Path) -> Iterator[str]:
                 else getattr(node.func, "id", "")
             )
             named = {word.arg: word.value for word in node.keywords}
-            # `open` may be that of an archive or of the store, which has no mode
+            # `open` may be a method of an archive or of the store, without a mode.
             position = 1 if isinstance(node.func, ast.Name) or called == "fdopen" else 0
             at = 0 if called.endswith("TemporaryFile") else position
             mode = named.get("mode", node.args[at] if len(node.args) > at else None)
@@ -234,7 +231,7 @@ def unencoded(path: Path) -> Iterator[str]:
 
 
 def test_no_text_depends_on_the_locale() -> None:
-    """`LC_ALL=C` with `PYTHONUTF8=0` makes ASCII of what names no encoding."""
+    """With `LC_ALL=C` and `PYTHONUTF8=0`, text without a named encoding is ASCII."""
     assert [where for path in sources() for where in unencoded(path)] == []
 
 

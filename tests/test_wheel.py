@@ -1,6 +1,4 @@
-"""The wheel in an environment of its own: it holds everything that runs, and works from any
-directory.
-"""
+"""The wheel in an environment of its own: complete, and usable from any directory."""
 
 from __future__ import annotations
 
@@ -31,7 +29,7 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel, by the build backend that pyproject.toml names, as it is installed."""
+    """The wheel, built by the build backend of pyproject.toml."""
     folder = tmp_path_factory.mktemp("wheel")
     command = [sys.executable, "-m", "hatchling", "build", "--target", "wheel"]
     with with_compiler():
@@ -42,7 +40,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The `bin` of an empty environment with the wheel; its dependencies are those of this
+    """The `bin` of an empty environment with the wheel; its dependencies come from this
     interpreter.
     """
     folder = tmp_path_factory.mktemp("installed") / "venv"
@@ -60,7 +58,7 @@ def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     ]
     subprocess.run([*install, "--no-deps", "--no-index", str(wheel)], check=True)
     (packages,) = folder.glob("lib/python*/site-packages")
-    # a site directory, so that the .pth files in it count, too
+    # a site directory, so the .pth files in it count, too
     line = f"import site; site.addsitedir({sysconfig.get_path('purelib')!r})\n"
     (packages / "dependencies.pth").write_text(line)
     return python.parent
@@ -86,7 +84,7 @@ def run(environment: Path, tmp_path: Path) -> Run:
 
 
 def clean(variables: os._Environ[str] | dict[str, str]) -> dict[str, str]:
-    """The variables without those that let Python find this repository."""
+    """The variables except for any that let Python find this repository."""
     return {name: value for name, value in variables.items() if not name.startswith("PYTHON")}
 
 
@@ -135,7 +133,7 @@ def test_the_wheel_holds_all_that_runs(wheel: Path) -> None:
 
 
 def test_the_wheel_serves_every_python_of_one_platform(wheel: Path) -> None:
-    """It holds machine code, which knows nothing of Python."""
+    """The machine code of the wheel is independent of the version of Python."""
     platform = re.sub(r"[-.]", "_", sysconfig.get_platform())
     assert wheel.name.endswith(f"-py3-none-{platform}.whl")
     with zipfile.ZipFile(wheel) as archive:

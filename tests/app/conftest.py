@@ -16,7 +16,7 @@ from tests.app.recorded import recorded_service
 
 @pytest.fixture
 def anyio_backend() -> str:
-    """What runs the tests that are coroutines."""
+    """The event loop of tests that are coroutines."""
     return "asyncio"
 
 

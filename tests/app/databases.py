@@ -1,6 +1,4 @@
-"""Databases that tests run against: SQLite in a file, and a PostgreSQL server of their own where
-there is one.
-"""
+"""Databases of the tests: SQLite in a file, and a PostgreSQL server of their own if installed."""
 
 from __future__ import annotations
 
@@ -33,7 +31,7 @@ async def opened(url: str) -> AsyncIterator[Store]:
 
 
 def _binary(name: str) -> Path | None:
-    # Debian keeps the servers of each version apart and off the path
+    # Debian keeps the servers of each version apart and off the path.
     found = sorted(Path("/usr/lib/postgresql").glob(f"*/bin/{name}"))
     on_path = shutil.which(name)
     return found[-1] if found else Path(on_path) if on_path else None
@@ -84,7 +82,7 @@ class Postgres:
             time.sleep(0.05)
 
     def stop(self) -> None:
-        """Ends it as a crash does: what it has acknowledged must be there when it starts again."""
+        """Ends the server like a crash; the next start must find all acknowledged data."""
         if self.process is not None:
             self.process.send_signal(3)  # SIGQUIT, PostgreSQL's immediate shutdown
             self.process.wait(START)

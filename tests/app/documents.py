@@ -1,4 +1,4 @@
-"""The OpenAPI document of a service without settings of its own, which takes a second to build."""
+"""The OpenAPI document of a service without settings of its own; to build it takes a second."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SHARED = "PYTEST_SHARED_FOLDER"
 
 @cache
 def open_document() -> dict[str, Any]:
-    """As it is served; nobody changes it. One of the processes builds it for all."""
+    """The document as served, not to be changed; one of the processes builds it for all."""
     kept = Path(os.environ[SHARED], "openapi.json")
     with kept.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)

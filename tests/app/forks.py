@@ -1,8 +1,8 @@
-"""Programs of the package as forks of a process that has imported it: each import of its own would
-take two seconds of processor time.
+"""Programs of the package as forks of a process with all imports done.
 
-A fork has its own environment, folder and standard streams. It runs a module as `python -m` does,
-or code as `python -c` does.
+The imports of a new interpreter would take two seconds of processor time. A fork has its own
+environment, folder and standard streams. It runs a module as `python -m` does, or code as `python
+-c` does.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ ORIGIN = "PYTEST_FORKS"
 
 
 class Fork:
-    """A running program, with the methods of `subprocess.Popen` that tests need."""
+    """A running program with some of the methods of `subprocess.Popen`."""
 
     def __init__(
         self,
@@ -64,13 +64,13 @@ class Fork:
         self.pid = _number(self._told)
 
     def wait(self, timeout: float | None = None) -> int:
-        """The exit code, or minus the number of the signal that ended it.
+        """The exit code, or minus the number of the signal at the end of the program.
 
         Args:
-            timeout: most that it may take [s].
+            timeout: longest wait [s].
 
         Raises:
-            TimeoutError: it still runs.
+            TimeoutError: the program still runs.
         """
         if self._code is None:
             self._told.settimeout(timeout)
@@ -100,7 +100,7 @@ def run(
     stdin: bytes = b"",
     folder: Path = ROOT,
 ) -> subprocess.CompletedProcess[bytes]:
-    """A program that has ended within `patience` [s], with what it wrote."""
+    """Runs a program to its end, within `patience` [s], and returns its output."""
     with TemporaryFile() as given, TemporaryFile() as out, TemporaryFile() as err:
         given.write(stdin)
         given.seek(0)
@@ -118,14 +118,14 @@ def _number(told: socket.socket) -> int:
 
 @functools.cache
 def _origin() -> socket.socket:
-    """The connection of this process to the process that forks."""
+    """The connection of this process to the forking process."""
     if ORIGIN not in os.environ:
         start_origin()
     return _connection()
 
 
 def _connection() -> socket.socket:
-    """A connection to the process that forks, which ends with its last connection."""
+    """A new connection to the forking process, which ends with its last connection."""
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     connection.connect(f"\0{os.environ[ORIGIN]}")
     atexit.register(connection.close)
@@ -133,8 +133,9 @@ def _connection() -> socket.socket:
 
 
 def start_origin() -> None:
-    """Starts the process that forks, for this process and the processes that it starts: to import
-    the package takes as long as the tests of a room.
+    """Starts the forking process for this process and its children.
+
+    The import of the package takes as long as the tests of a room.
     """
     address = f"joulepath-forks-{os.getpid()}"
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
@@ -151,8 +152,11 @@ def start_origin() -> None:
 
 
 def _asked() -> list[str]:
-    """Forks at each request until all that could ask have ended. A fork returns the name of its
-    module and its arguments; a second one beside it tells of its end."""
+    """Forks at each request until no connection is left.
+
+    A fork returns the name of its module and its arguments. A second process beside the fork
+    reports its end.
+    """
     listening = socket.socket(fileno=os.dup(0))
     ways: list[socket.socket] = []
     while True:
@@ -198,8 +202,11 @@ def _begun(request: bytes, given: list[int]) -> list[str]:
 
 
 def fork_forkserver() -> None:
-    """Workers of a service are forked from a process that `multiprocessing` starts: here it is a
-    fork of the service, which has imported all that it would import."""
+    """Makes the fork server of `multiprocessing` a fork of this process.
+
+    Workers of a service are forked from the fork server, which needs no imports of its own this
+    way.
+    """
     start = util.spawnv_passfds
 
     def started(path: bytes, arguments: Sequence[Any], passed: Sequence[int]) -> int:
@@ -207,11 +214,11 @@ def fork_forkserver() -> None:
         if "multiprocessing.forkserver" not in code:
             return start(path, arguments, passed)
         with warnings.catch_warnings():
-            # the threads of a process that runs tests hold nothing that the fork needs
+            # Threads of a test process hold nothing of use to the fork.
             warnings.simplefilter("ignore", DeprecationWarning)
             process = os.fork()
         if process == 0:
-            # it would write of an abort to whatever has the file of its messages by then
+            # By then, another file may have the descriptor that faulthandler writes to.
             faulthandler.disable()
             kept = sorted({2, *passed, os.sysconf("SC_OPEN_MAX")})
             for one, other in pairwise(kept):
@@ -226,8 +233,10 @@ def fork_forkserver() -> None:
 
 
 def _run_module() -> None:
-    """Runs a module and ends the process as the interpreter does, but for freeing all objects,
-    which takes longer than most commands."""
+    """Runs a module and ends the process as the interpreter does, without freeing all objects.
+
+    To free all objects takes longer than most commands.
+    """
     code: Any = None
     try:
         runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)

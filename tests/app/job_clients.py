@@ -1,6 +1,4 @@
-"""What tests do with jobs over HTTP, and a service that is killed and started again while a job
-runs.
-"""
+"""Helpers for tests of jobs over HTTP, and a service killed and restarted during a job."""
 
 from __future__ import annotations
 
@@ -26,12 +24,12 @@ ENDED = ("done", "cancelled")
 
 
 def evaluation(seconds: float = 1.5) -> dict[str, Any]:
-    """A request that takes a few milliseconds."""
+    """A request of a few milliseconds."""
     return {"evaluate": {"configurations": [HOME, NEAR], "time_per_segment": seconds}}
 
 
 def optimization(mass: float = 1.0, **fields: Any) -> dict[str, Any]:
-    """A request that takes a tenth of a second."""
+    """A request of a tenth of a second."""
     return {"optimize": move(payload={"mass": mass, "com": [0.0, 0.0, 0.05]}, **fields)}
 
 
@@ -97,9 +95,7 @@ MOMENT = 0.03
 
 
 class KilledService:
-    """A service on one database that is killed again and again, and a client that follows the
-    events of its job.
-    """
+    """A service on one database, killed again and again, and a client on the events of its job."""
 
     def __init__(self, folder: Path, seed: int, **settings: Any) -> None:
         self._settings = {"database_url": f"sqlite:///{folder}/joulepath.db", **settings}
@@ -109,8 +105,10 @@ class KilledService:
         self.progress_at_kills: list[float] = []
 
     def run(self, requests: list[Any], kills: int) -> tuple[list[dict[str, Any]], dict[str, Any]]:
-        """Sends a job, kills the service `kills` times while the job runs, each time after random
-        requests of the next part of it, and returns the results of the job and the job."""
+        """Sends a job and kills the service `kills` times during its run; returns job and results.
+
+        The kills come after random requests of successive parts of the job.
+        """
         path = ""
         while True:
             with serving(**self._settings) as server:
@@ -147,7 +145,7 @@ class KilledService:
 
 @dataclass(frozen=True)
 class _Over:
-    """A server as a client that takes paths."""
+    """A server as a client with paths instead of URLs."""
 
     server: Server
 

@@ -46,7 +46,7 @@ certificates of all issuers.
 
 @dataclass(frozen=True)
 class OpenRequest:
-    """A request that was sent. Leaving the context closes its connection."""
+    """A sent request; leaving the context closes its connection."""
 
     connection: socket.socket
 
@@ -56,7 +56,7 @@ class OpenRequest:
         return bool(select.select([self.connection], [], [], 0)[0])
 
     def status(self) -> int:
-        """HTTP status of the answer, which must have begun to arrive."""
+        """HTTP status of the answer, whose first bytes must have arrived."""
         return int(self.connection.recv(len(b"HTTP/1.1 200")).split()[1])
 
     def __enter__(self) -> OpenRequest:
@@ -81,7 +81,7 @@ class Server:
         return CLIENT.post(self.url + path, json=body, **options)
 
     def open(self, path: str, body: Any, **headers: str) -> OpenRequest:
-        """A POST whose answer nobody waits for, over a connection of its own."""
+        """A POST over a connection of its own, with no wait for the answer."""
         host, port = self.url.removeprefix("http://").split(":")
         content = json.dumps(body).encode()
         head = {
@@ -101,9 +101,7 @@ class Server:
         return OpenRequest(connection)
 
     def logged(self) -> list[dict[str, Any]]:
-        """Every line logged so far: each must be JSON. A line that is still being written is left
-        for the next time.
-        """
+        """Every finished line of the log, as JSON; an unfinished line is left for the next call."""
         finished, _, _ = self.log.read_bytes().rpartition(b"\n")
         return [json.loads(line) for line in finished.splitlines()]
 
@@ -117,7 +115,7 @@ class Server:
         return found
 
     def workers(self) -> list[int]:
-        """Process ids of the workers that became warm and live."""
+        """Process ids of the warm workers alive."""
         alive = self.descendants()
         return [
             entry["pid"]
@@ -136,7 +134,7 @@ class Server:
         return "joulepath_workers_busy 0.0" in found and "joulepath_queue_length 0.0" in found
 
     def request_logged(self, path: str) -> dict[str, Any]:
-        """The log's line about the last request for this path, which was answered before."""
+        """The log's line about the last answered request for this path."""
         end = time.monotonic() + ANSWER
         while True:
             found = [
@@ -171,7 +169,7 @@ class Server:
 
 
 def free_port() -> int:
-    """A port that no program of this machine has."""
+    """A port unused on this machine."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         return int(free.getsockname()[1])
@@ -221,7 +219,7 @@ def until(condition: Callable[[], bool], patience: float = ANSWER) -> None:
 
 
 def processor_time(pid: int) -> float:
-    """Processor time that a process has used [s]: a worker without a task uses none."""
+    """Processor time used by a process [s]; a worker without a task uses none."""
     times = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
     return sum(map(int, times)) / os.sysconf("SC_CLK_TCK")
 

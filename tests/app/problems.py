@@ -10,8 +10,6 @@ from joulepath.optimizer.exceptions import DeclaredError
 
 
 def checked(kind: type[DeclaredError], content: Any) -> Any:
-    """The fields of a document (its bytes, text or object), which must be one of this type of
-    error.
-    """
+    """The fields of a document (bytes, text or object), checked against this type of error."""
     document = content if isinstance(content, str | bytes) else json.dumps(content)
     return model_of_problem(kind).model_validate_json(document)

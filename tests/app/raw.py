@@ -1,4 +1,4 @@
-"""Raw sockets to a service: what no HTTP client would send, and what none would leave unread."""
+"""Raw sockets to a service, for requests sent and answers left unread by no HTTP client."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class RawAnswer:
 
     @property
     def problem(self) -> dict[str, Any]:
-        """Its content, which must be a problem."""
+        """The content, parsed as a problem."""
         assert self.headers["content-type"] == "application/problem+json"
         content: dict[str, Any] = orjson.loads(self.body)
         assert content["status"] == self.status
@@ -47,7 +47,7 @@ def connected(
 def post(
     path: str, body: bytes = b"", declared: int | None = None, kind: str = "application/json"
 ) -> bytes:
-    """A request, whose declared size may be larger than what is sent."""
+    """A request; its declared size may exceed the size of its body."""
     size = len(body) if declared is None else declared
     head = (
         f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: {kind}\r\nContent-Length: "
@@ -57,7 +57,7 @@ def post(
 
 
 def answer_on(connection: socket.socket) -> RawAnswer:
-    """The next response. What comes after it is left for the next time."""
+    """The next response; bytes after it are left for the next call."""
     with connection.makefile("rb", buffering=0) as stream:
         status = int(stream.readline().split()[1])
         lines = iter(lambda: stream.readline().strip().decode(), "")
@@ -72,7 +72,9 @@ def answer_on(connection: socket.socket) -> RawAnswer:
 
 
 def ends(connection: socket.socket) -> bool:
-    """Waits until the service closes the connection, and throws away what it sends until then."""
+    """Waits until the service closes the connection, and discards everything received
+    until then.
+    """
     try:
         while connection.recv(1 << 16):
             pass

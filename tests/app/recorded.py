@@ -1,5 +1,4 @@
-"""The service with recorded results: what searches for motions answers at once, so that tests of
-HTTP need no search.
+"""The service with recorded results of searches, so tests of HTTP need no search.
 
 `python -m tests.app.recorded` is such a service, `python -m tests.app.recorded record` writes the
 recordings anew.
@@ -81,9 +80,7 @@ def record(kind: str) -> dict[str, Any]:
 
 
 def recorded(kind: str, request_id: str) -> TaskResult:
-    """The recorded result as that of a request. All ids are new, and the wall time is another one
-    each time.
-    """
+    """The recorded result as the result of a request, with new ids and a new wall time."""
     text = (FOLDER / f"{kind}.json").read_bytes()
     for number, old in enumerate(dict.fromkeys(_ID.findall(text))):
         text = text.replace(old, b"%08x%s" % (next(_count) * 64 + number, old[8:]))
@@ -117,8 +114,7 @@ def _instead_of(
 
 
 class RecordedWorker:
-    """A worker in a thread of the service, whose searches have been recorded. Other tasks are
-    run."""
+    """A worker in a thread of the service with recorded searches; other tasks are run."""
 
     alive, is_free, pid = True, True, None
 
@@ -163,8 +159,7 @@ def _ended(task: Task, deadline: float) -> Ended:
 
 @contextmanager
 def recorded_workers() -> Iterator[None]:
-    """A context in which services start with recorded workers; those that have started keep
-    them."""
+    """A context in which services start with recorded workers and keep them."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pool, "Worker", RecordedWorker)
         for module in (pool, forkserver):

@@ -1,4 +1,4 @@
-"""Requests that several tests send."""
+"""Requests of several tests."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ EXAMPLES: dict[str, dict[str, Any]] = {
 
 
 def move(**fields: Any) -> dict[str, Any]:
-    """A short motion between joint positions, and whatever else is given."""
+    """A short motion between joint positions, with further fields."""
     return {"start": {"q": HOME}, "goal": {"q": NEAR}, **PATIENT, **fields}
 
 
 def long_search(deadline: float) -> dict[str, Any]:
-    """A search over thousands of candidates that takes as long as it may."""
+    """A search over thousands of candidates, ended only by its deadline."""
     start, goal = (
         {"pose": {"position": position, "quaternion": [0.0, 1.0, 0.0, 0.0]}}
         for position in ([0.4, 0.2, 0.35], [0.3, -0.4, 0.2])

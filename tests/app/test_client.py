@@ -98,7 +98,7 @@ def test_every_problem_becomes_its_error(kind: type[Any]) -> None:
 
 
 def test_the_message_is_that_of_the_service() -> None:
-    """Also where the message has data that no document shows."""
+    """The message is kept even if it has data absent from every document."""
     error = OutsideLimits("goal", "elbow", 7.0, -3.0, 3.0)
     told = error_of(json.loads(json.dumps(problem_of(error, "7"))))
     assert str(told) == str(error)
@@ -124,7 +124,9 @@ def test_a_job_from_begin_to_end(service: joulepath.Client) -> None:
 
 
 def test_a_wait_outlasts_a_restart_of_the_service() -> None:
-    """But neither a service that never answers, nor one that stays away, nor a deleted job."""
+    """The wait ends with an error if the service never answers or stays away, or the job is
+    deleted.
+    """
     stopping = problem_of(ShuttingDown(), "7")
     going = httpx2.Response(200, json={"state": "running"})
     away: list[httpx2.Response | Exception]
@@ -167,7 +169,9 @@ def test_another_server_is_no_service(content: bytes) -> None:
 
 @pytest.mark.parametrize("content", [b"<html>Log in</html>", b"[]", b""])
 def test_another_server_that_answers_is_no_service(content: bytes) -> None:
-    """A page of a proxy, and a redirection, which is not followed with the key."""
+    """The client refuses a proxy's page and a redirection, and does not send the key to the new
+    address.
+    """
     other = answering(200, content)
     with pytest.raises(joulepath.ServiceUnreachable, match="another program"):
         other.optimize(move())
@@ -184,7 +188,7 @@ def test_arrays_of_any_layout_are_sent(service: joulepath.Client) -> None:
 
 @pytest.mark.parametrize("value", [float("nan"), np.array(np.inf), {1}, object(), 2**70])
 def test_what_json_has_not_is_refused(service: joulepath.Client, value: object) -> None:
-    """NaN is not sent as null, which would leave the field out."""
+    """NaN is not sent as null, because null would leave the field out."""
     with pytest.raises(joulepath.InvalidRequest) as caught:
         service.optimize(move(), duration=value)
     assert caught.value.errors[0]["loc"] in (["body", "duration"], ["body"])

@@ -1,6 +1,4 @@
-"""The numbers that the documentation prints beside a request are those of the service's own answer
-to it.
-"""
+"""Numbers printed beside a request in the documentation equal the service's answer to it."""
 
 from __future__ import annotations
 
@@ -27,8 +25,7 @@ BUSES: dict[str, dict[str, Any]] = {
 TOTAL = "energy/electrical/total"
 BOUND = "energy/lower_bound"
 GAP = "energy/optimality_gap"
-# where it stands, what it looks like, the path and file of the request, what is changed of it, and
-# the field it states
+# page, pattern of the number, path and file of the request, changes of it, and the stated field
 SAID: list[tuple[str, str, str, dict[str, Any], str]] = [
     ("README.md", r"at most ([\d.]+) % above the least", "optimize/paper_pose_1", {}, GAP),
     (
@@ -128,7 +125,7 @@ def answer_to(server: Server, request: str, changes: dict[str, Any]) -> dict[str
 
 
 def stated(page: str, pattern: str) -> float:
-    """The only number on a page that a pattern finds, wherever its lines break."""
+    """The only number on a page found by the pattern, across line breaks."""
     (number,) = re.findall(pattern.replace(" ", r"\s+"), (ROOT / page).read_text())
     return float(number)
 

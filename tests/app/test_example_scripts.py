@@ -1,6 +1,4 @@
-"""The programs in `examples` run with the commands that their own first lines and the documentation
-name.
-"""
+"""The programs in `examples` run with the commands of their first lines and the documentation."""
 
 from __future__ import annotations
 
@@ -16,7 +14,7 @@ from tests.app.live import ANSWER, ROOT, Server
 
 EXAMPLES = ROOT / "examples"
 PNG = b"\x89PNG"
-# several requests, or one that takes long: the cycles in many times are cut to one
+# several requests, or a slow one: the cycles in many times are cut to one
 SLOW = {
     "plot_cycle",
     "plot_cycle_times",
@@ -45,7 +43,7 @@ PICTURES = [
 
 
 def run(name: str, *arguments: str) -> str:
-    """What an example prints that ends without an error."""
+    """The output of an example, which must end without an error."""
     done = forks.run((f"examples.{name}", *arguments), os.environ, 5 * ANSWER)
     assert done.returncode == 0, done.stderr
     return done.stdout.decode()

@@ -66,7 +66,7 @@ def scheduler(folder: Path, port: int) -> ExitStack:
 
 
 def machines(server: Server) -> list[int]:
-    """Workers of each machine; none while the scheduler cannot be reached."""
+    """Workers of each machine; none while the scheduler is out of reach."""
     answer = server.get("/cluster")
     if answer.status_code != 200:
         checked(ClusterUnavailable, answer.json())
@@ -75,7 +75,7 @@ def machines(server: Server) -> list[int]:
 
 
 def computing(log: Path) -> list[int]:
-    """Processes of a machine that are warm."""
+    """Warm processes of a machine."""
     found = [int(pid) for pid in re.findall(r'"worker warm","pid":(\d+)', log.read_text())]
     return [pid for pid in found if alive(pid)]
 
@@ -131,7 +131,7 @@ def test_what_is_killed_loses_and_doubles_nothing(tmp_path: Path) -> None:
         assert computing(logs[1]) == [worker], "it has ended the search by itself"
 
         dask.close()
-        # a service that has not noticed it yet would begin the job
+        # Until it notices the loss, a service would begin the job.
         until(lambda: all(machines(server) == [] for server in services))
         path = sent(over(services[0]), [evaluation()])
         assert services[0].post("/optimize", move()).status_code == 200, "by its own worker"

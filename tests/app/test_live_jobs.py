@@ -34,7 +34,7 @@ LONG = {"optimize": long_search(100.0)}
 
 
 def mixture(count: int) -> list[dict[str, Any]]:
-    """Different requests, one in four of which takes longer than the others."""
+    """Different requests, one in four of them slower than the others."""
     durations = [1.0 + 0.005 * k for k in range(count)]
     return [evaluation(each) if k % 4 else optimization(each) for k, each in enumerate(durations)]
 
@@ -58,8 +58,8 @@ def check_each_once(lines: list[dict[str, Any]], job: dict[str, Any], requests: 
     ids=["short", "long"],
 )
 def test_a_killed_service_loses_and_doubles_nothing(kills: int, count: int, tmp_path: Path) -> None:
-    """Neither answers nor events: the client knows the number of the last event that it received
-    whole.
+    """The client knows the number of its last complete event, and neither answers nor events
+    repeat.
     """
     requests = mixture(count)
     service = KilledService(tmp_path, seed=kills, workers=1, deadline_grace=GRACE)

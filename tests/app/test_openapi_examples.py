@@ -1,6 +1,4 @@
-"""Every example of the OpenAPI document, sent as it is served: the documentation page sends it like
-that.
-"""
+"""Every example of the OpenAPI document, sent unchanged, as the documentation page sends it."""
 
 from __future__ import annotations
 
@@ -58,7 +56,7 @@ class Operation:
 
 
 def example_of(parameter: dict[str, Any]) -> Any:
-    """The example of a parameter's schema; a parameter whose values are JSON has its schema in
+    """The example of a parameter's schema; a parameter with JSON values has its schema in
     `content`.
     """
     schema = parameter.get("schema") or parameter["content"]["application/json"]["schema"]
@@ -135,7 +133,7 @@ SLOW = (
 
 @pytest.fixture
 def robot(client: TestClient) -> str:
-    """The name of a robot that a user added."""
+    """The name of a robot added by a user."""
     answer = client.put("/robots/added", json=PUT_EXAMPLES["makers_figures"]["value"])
     assert answer.is_success, answer.text
     return "added"
@@ -158,7 +156,7 @@ def log(client: TestClient) -> str:
 
 @pytest.fixture(scope="module")
 def made(client: TestClient, kept: str, log: str, job: str) -> dict[str, str]:
-    """Ids of what the service keeps, by the list that has it. Nothing is deleted from them."""
+    """Ids of stored items by their list; no test deletes these items."""
     answer = client.post("/identifications", json={"logs": [log]})
     assert answer.status_code == 202, answer.text
     identification = str(answer.json()["id"])
@@ -175,7 +173,7 @@ def test_body_is_answered(name: str, client: TestClient, made: dict[str, str], l
     url = operation.path.format(id=id, name="put", format=name.split()[-1])
     content = example["value"]
     if media_type == "text/csv":
-        # the settings of a CSV file are query parameters, which the example's summary names
+        # The settings of a CSV file are query parameters, named in the summary of the example.
         query = re.search(r"\?\S+", example["summary"])
         url += query[0] if query else ""
     else:
@@ -194,8 +192,8 @@ def test_path_is_answered(operation: Operation, client: TestClient, robot: str) 
     names = operation.parameters("path")
     if operation.method in ("put", "patch", "delete"):
         names |= {"name": robot}
-    # an id stands for something that was made before; the example's was not, and the document says
-    # what then comes
+    # Nothing is stored under the id of the example; the document states the response to unknown
+    # ids.
     expected = 404 if "id" in names else 204 if operation.method == "delete" else 200
     body = next((example["value"] for _, _, example in operation.bodies()), None)
     answer = client.request(operation.method, operation.path.format(**names), json=body)

@@ -1,4 +1,4 @@
-"""The recordings of `tests.app.recorded` are what the service answers today."""
+"""The recordings of `tests.app.recorded` equal the answers of the service today."""
 
 from __future__ import annotations
 

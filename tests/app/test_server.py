@@ -40,11 +40,11 @@ from tests.app.requests import EXAMPLES, long_search, move
 
 T = TypeVar("T")
 
-# What a busy machine may take for anything below [s]; no test waits for it to pass.
+# The longest that a busy machine takes for any step below [s]; no test waits for it to pass.
 PATIENCE = 60.0
-# A deadline that a busy machine does not reach before a test is through with the request [s].
+# A deadline out of reach of a busy machine within one test [s].
 LONG = 30.0
-# Processor time that only a worker with a task uses [s].
+# Processor time used only by a worker with a task [s].
 AT_WORK = 0.1
 
 
@@ -58,7 +58,7 @@ def received(server: Server) -> int:
 def in_background(
     pool: ThreadPoolExecutor, server: Server, body: Any, count: int = 1
 ) -> list[Future[httpx2.Response]]:
-    """Requests that the server has received."""
+    """Sends requests from threads and returns once the service has received them."""
     expected = received(server) + count
     futures = [pool.submit(server.post, "/optimize", body) for _ in range(count)]
     until(lambda: received(server) >= expected)
@@ -66,7 +66,7 @@ def in_background(
 
 
 def start_work(server: Server, start: Callable[[], T], workers: int) -> T:
-    """What `start` returns, once that many workers are at work on it; all were idle."""
+    """Calls `start` and returns its result once so many idle workers are at work."""
     before = {pid: processor_time(pid) for pid in server.workers()}
 
     def at_work() -> int:
@@ -78,7 +78,7 @@ def start_work(server: Server, start: Callable[[], T], workers: int) -> T:
 
 
 def until_replaced(server: Server, before: list[int], count: int) -> None:
-    """Until that many of the workers have been killed, and others are warm in their place."""
+    """Waits until `count` workers have been killed and warm workers have replaced them."""
 
     def replaced() -> bool:
         now = server.workers()
@@ -144,7 +144,7 @@ def test_a_crash_costs_no_answer(server: Server) -> None:
     before = server.workers()
     assert len(before) == 2
     with ThreadPoolExecutor() as pool:
-        # two, so that the one worker that is killed has one of them
+        # two requests, one of them on the killed worker
         futures = start_work(
             server, lambda: in_background(pool, server, long_search(deadline=6), 2), workers=2
         )

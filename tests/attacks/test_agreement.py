@@ -23,7 +23,7 @@ from tests.selection import long_but
 Json = dict[str, Any]
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-# relative: what solves of the same motion may differ by
+# relative: largest difference between solves of the same motion
 AGREED = 1e-3
 # s: nothing here is to end by the deadline on a loaded machine
 DEADLINE = 120.0

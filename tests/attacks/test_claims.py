@@ -1,6 +1,4 @@
-"""What answers claim: branches at the edge of the reach, torque between samples, and the word
-`optimal`.
-"""
+"""Claims of answers: branches at the edge of the reach, torque between samples, and `optimal`."""
 
 from __future__ import annotations
 
@@ -19,7 +17,7 @@ from tests.selection import long_but
 
 # m; accuracy of a configuration within reach
 ACCURACY = 1e-9
-# relative; solves from the same configuration to two poses that differ by less than a micrometre
+# relative; solves from one configuration to two poses less than a micrometre apart
 SAME = 1e-4
 
 
@@ -59,7 +57,7 @@ def test_a_pose_that_is_hardly_out_of_reach_keeps_its_branches(robot: str, seed:
             np.linalg.norm(chain.flange(each[None])[0, :3, 3] - moved[:3, 3]) < beyond + ACCURACY
             for each in found
         )
-        # one configuration at the edge, where two branches meet
+        # one configuration at the edge, the meeting point of two branches
         assert sum(nearest([each], q) < 1e-3 for each in found) == 1
 
 

@@ -1,8 +1,7 @@
-"""Cycles in a given time need no more than any simpler cycle that is known, whatever the time, and
-wherever it ends.
+"""Cycles in a given time need no more energy than any known simpler cycle.
 
-The fastest move of `HARD` is not found by a search from nothing, so that its time could once not be
-shared at all.
+The claim holds for every duration and for every end of the search by its deadline. A search from
+scratch does not find the fastest move of `HARD`, so its time could once not be shared at all.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ from tests.optimizer.cycle.cycles import pick_and_place
 from tests.optimizer.moves import AMPLE, ROBOT, fixed
 from tests.selection import long_but
 
-# the module, which the function of the same name hides
+# the module, hidden by the function of the same name
 ENTRY = import_module("joulepath.optimizer.plan_cycle")
 # relative: sums of the same energies in another order
 ROUNDING = 1e-9
@@ -71,7 +70,7 @@ def free() -> CycleSolution:
 
 
 def near_cycles(seed: int) -> Cycle:
-    """Two to four stops near each other with up to 5 kg, some with a dwell, closed or open."""
+    """A random cycle of two to four near stops with up to 5 kg, some with a dwell, some closed."""
     rng = np.random.default_rng(seed)
     q, stops = [rng.uniform(-WHOLE_RANGE, WHOLE_RANGE, 6)], list[Stop]()
     for k in range(int(rng.integers(2, 5))):
@@ -84,7 +83,7 @@ def near_cycles(seed: int) -> Cycle:
 
 
 def waiting_power(found: CycleSolution) -> float:
-    """What waiting draws where it draws least [W], on the motors: by Pinocchio's torques."""
+    """The least power of waiting at a stop [W] on the motors, by Pinocchio's torques."""
     still = np.zeros((1, 6))
 
     def at_rest(arm: Arm, q: Array) -> float:
@@ -98,8 +97,10 @@ def energy(found: CycleSolution) -> float:
 
 
 def assert_no_dearer_than_its_baselines(found: CycleSolution) -> None:
-    """Not than `controller_default`: its acceleration jumps where it begins, which no certificate
-    confirms.
+    """No baseline within the limits needs less energy than the cycle.
+
+    `controller_default` is left out: its acceleration jumps at its start, so no certificate
+    confirms it.
     """
     assert all(move.solution.certificate.valid for move in found.moves)
     assert found.lower_bound <= energy(found) * (1 + ROUNDING)
@@ -111,7 +112,7 @@ def assert_no_dearer_than_its_baselines(found: CycleSolution) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("duration", long_but([2.5], [1.9, 2.5, 5.0]))
 def test_a_cycle_whose_fastest_move_is_hard_to_find_has_its_time_shared(duration: float) -> None:
-    """The right value is that of its two moves in all shares of the time, each by `optimize`."""
+    """Every share of the time between the two moves, by `optimize`, gives the expected energy."""
     found = plan_cycle(in_time(HARD, duration))
     assert_no_dearer_than_its_baselines(found)
     assert {"same_factor", "fastest_then_wait"} <= {each.name for each in found.baselines}
@@ -132,7 +133,7 @@ def test_a_cycle_whose_fastest_move_is_hard_to_find_has_its_time_shared(duration
 
 
 class Spied(CycleSearch):
-    """A search that tells what it has found."""
+    """A search whose results the test can read."""
 
     made: ClassVar[list[CycleSearch]] = []
 
@@ -142,8 +143,9 @@ class Spied(CycleSearch):
 
 
 def cheapest_known(asked: Cycle) -> Iterator[float]:
-    """Energies [J] of the cycles that the last search held: the chains of its finished moves, and a
-    wait.
+    """Energy [J] of the cheapest cycle in the hands of the last search.
+
+    It consists of finished moves and a wait.
     """
     assert asked.duration_max is not None
     search = Spied.made[-1]
@@ -158,8 +160,9 @@ def cheapest_known(asked: Cycle) -> Iterator[float]:
 def test_wherever_the_deadline_ends_it_what_is_in_hand_counts(
     readings: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The clock moves by a second at each reading, so that the deadline passes between two readings
-    of the search.
+    """A search cut short anywhere returns the best of its finished cycles.
+
+    The clock moves by a second at each reading, so the deadline passes between two readings.
     """
     monkeypatch.setattr(ENTRY, "CycleSearch", Spied)
     asked = in_time(HARD, 2.5, deadline=float(readings))
@@ -176,7 +179,7 @@ def test_wherever_the_deadline_ends_it_what_is_in_hand_counts(
 @pytest.mark.long
 @pytest.mark.parametrize("seed", long_but([1], range(20)))
 def test_cycles_need_no_more_than_any_simpler_one_at_any_time(seed: int) -> None:
-    """Nor than a faster cycle of ours that waits: slower cycles may wait, too."""
+    """Slower cycles need no more energy than a faster cycle with a wait."""
     asked = near_cycles(seed)
     known, rng = plan_cycle(asked), np.random.default_rng(seed)
     for factor in np.sort(rng.uniform(1.0, 4.0, 3)):
@@ -233,7 +236,7 @@ def test_simple_cycles_that_are_not_confirmed_are_no_answer() -> None:
 def test_a_chain_that_is_finished_is_the_answer_once_the_time_is_up(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The search went on to another chain, and had no time left to finish that."""
+    """A finished chain is returned when time runs out in the search of the next chain."""
     search = CycleSearch(HARD, CountingClock(0.0))
     explored = [CycleSearch(HARD, CountingClock(0.0)).run()]
 

@@ -1,6 +1,4 @@
-"""The fastest motion: what a refusal names is no slower than a motion in hand, and is answered when
-it is asked for.
-"""
+"""The fastest motion: refusals name an attainable duration; no known motion is faster."""
 
 from __future__ import annotations
 
@@ -29,11 +27,11 @@ from tests.optimizer.moves import (
 )
 from tests.selection import long_but
 
-# a move whose minimum-time solve from one start ends at four times the fastest motion
+# a move with a minimum-time solve that, from one start, ends at four times the fastest motion
 LOCAL = [-1.477, -1.808, 1.483, 1.913, 0.829, -1.357], [-0.341, -2.823, 1.001, 1.472, 0.493, -2.509]
-# relative; what counts as the fastest motion may exceed the fastest one by this
+# relative; a motion within this share of the fastest one counts as the fastest
 PROVEN = FastestSettings().proven
-# a time in which no arm gets anywhere [s]
+# a time too short for any arm [s]
 TOO_SHORT = 0.05
 
 
@@ -48,7 +46,7 @@ def refused(asked: Problem, duration: float = TOO_SHORT) -> DurationTooShort:
 
 
 def named(error: DurationTooShort) -> float:
-    """The duration [s] that a refusal names."""
+    """The duration [s] named by a refusal."""
     assert error.shortest is not None
     return error.shortest
 
@@ -56,8 +54,8 @@ def named(error: DurationTooShort) -> float:
 def assert_answered(
     asked: Problem, error: DurationTooShort, shares: tuple[float, ...] = (1.0, 1.02)
 ) -> None:
-    """What the refusal names is answered, as a fixed duration and as the longest one, and a little
-    more as well.
+    """The duration named by a refusal is attainable: fixed, as the longest one, and a little
+    longer.
     """
     assert error.shortest is not None
     for share in shares:
@@ -74,8 +72,7 @@ def test_one_bad_local_optimum_is_not_the_shortest_duration() -> None:
     assert error.proven and not error.cut_short
     assert error.bound <= named(error) <= 0.7311
     assert_answered(asked, error)
-    # a motion that is faster by less than counts is answered, too: Ruckig's takes no more than the
-    # bound
+    # A motion at the proven bound is answered, too: Ruckig's takes no more time than the bound.
     exact = optimize(replace(asked, **fixed(error.bound * (1 + 1e-6))))
     assert exact.certificate.valid
     # it stands as it was found, and is not sold as the optimum
@@ -134,7 +131,7 @@ def test_what_is_named_is_answered(name: str) -> None:
 
 def test_equal_ends_take_the_least_duration() -> None:
     error = refused(problem(goal=START), DURATIONS.least / 2)
-    # the time of a motion that stands still is divided and multiplied again
+    # The duration of a motion at rest is divided and multiplied again.
     assert named(error) == pytest.approx(DURATIONS.least, rel=1e-12)
     assert error.bound == DURATIONS.least and error.proven
 
@@ -152,7 +149,10 @@ def test_phases_of_milliseconds_in_minutes() -> None:
 
 @pytest.mark.long
 def test_without_a_limit_on_jerk() -> None:
-    """Acceleration may jump there, which no spline's does: 2 ms more than the joints need."""
+    """Without a limit on jerk, acceleration may jump, unlike any spline's.
+
+    The spline takes at most 3 ms more than the joints need.
+    """
     robot = replace(ROBOT, limits=replace(ROBOT.limits, j_max=np.full(6, np.inf)))
     asked = problem(robot=robot, payload=Payload(4.5, np.array([0.05, 0.05, 0.12])))
     error = refused(asked)
@@ -219,9 +219,7 @@ def test_requests_of_other_kinds(name: str) -> None:
 
 @pytest.mark.parametrize("tick", long_but([0.02], [0.002, 0.005, 0.02, 0.1, 0.5]))
 def test_a_search_that_is_cut_short_says_so(tick: float) -> None:
-    """On a clock that each reading moves on: the search ends somewhere between its first start and
-    its last.
-    """
+    """The clock moves at each reading, so the search ends between its first and its last start."""
     tight = replace(MOVES["hardly any torque"], **fixed(TOO_SHORT))
     with pytest.raises(DurationTooShort) as caught:
         optimize(replace(tight, deadline=2.0), clock=CountingClock(tick))
@@ -237,7 +235,7 @@ def test_a_search_that_is_cut_short_says_so(tick: float) -> None:
 
 
 def test_the_words_of_a_refusal_are_enough() -> None:
-    """The duration in words is rounded up: what a person types from it is answered."""
+    """The duration in words is rounded up, so a person who types it gets an answer."""
     asked = local()
     words = str(refused(asked))
     told = float(next(each for each in words.split() if each[0].isdigit()))

@@ -1,7 +1,7 @@
-"""Installations as the documentation has them, and surroundings that are hostile to the service.
+"""Installations by the documentation, and environments hostile to the service.
 
-The deployment page's steps are run from a clean clone, as far as they need no root, no systemd and
-no container.
+The steps of the deployment page are run from a clean clone, apart from the steps with root, systemd
+or a container.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from tests.selection import long_but
 
 pytestmark = pytest.mark.usefixtures("compiler")
 DEPLOYED = ("/opt/joulepath", "/etc/joulepath", "/var/lib/joulepath", "/var/cache/joulepath")
-# these change the machine: root, or a program that only a server has
+# These commands change the machine: they need root, or a program of a server.
 OF_ROOT = ("useradd ", "cp deploy/", "nginx -t")
 INSTALLED = 1500.0  # s; for a gigabyte of packages on a machine with much else to do
 BUILT = 600.0  # s; for a wheel, with its build requirements
@@ -83,7 +83,7 @@ def post(
 
 
 def loaded_files(get: Callable[[str], str]) -> set[str]:
-    """The paths of all files that the studio page loads; `get` gives the text of each, or fails."""
+    """The paths of all files of the studio page; `get` gives the text of each, or fails."""
     waiting = re.findall(r'(?:href|src)="(studio/[^"]+)"', get("studio"))
     found = set[str]()
     while waiting:
@@ -99,7 +99,7 @@ def loaded_files(get: Callable[[str], str]) -> set[str]:
 
 
 def check_studio(url: str) -> None:
-    """The studio page and every file that it loads are there."""
+    """The studio page and all its files are there."""
 
     def get(path: str) -> str:
         with urllib.request.urlopen(f"{url}/{path}", timeout=ANSWERED) as answer:
@@ -113,7 +113,7 @@ def check_studio(url: str) -> None:
 
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A clean clone of what is committed."""
+    """A clean clone of the committed files."""
     folder = tmp_path_factory.mktemp("clone") / "joulepath"
     subprocess.run(["git", "clone", "--quiet", ROOT, folder], check=True)
     return folder
@@ -125,7 +125,7 @@ def copy_of(clone: Path, folder: Path) -> Path:
 
 
 def build(source: Path, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """What `pip install .` does first: the wheel, by build requirements of its own."""
+    """The first step of `pip install .`: the wheel, with its own build requirements."""
     command = [
         sys.executable,
         "-m",
@@ -151,7 +151,7 @@ def build(source: Path, folder: Path, **environment: str) -> subprocess.Complete
 def test_the_wheel_of_a_clean_clone_computes_and_shows_the_studio(
     clone: Path, tmp_path: Path, has_programs: bool
 ) -> None:
-    """Also where npm and a C compiler have to come as build requirements."""
+    """The claim holds also for npm and the C compiler as build requirements."""
     if has_programs and shutil.which("npm") is None:
         pytest.skip("there is no npm on this machine")
     (tmp_path / "empty").mkdir()
@@ -190,8 +190,9 @@ def test_the_wheel_of_a_clean_clone_computes_and_shows_the_studio(
 @pytest.mark.long
 @in_a_repository
 def test_the_source_archive_has_what_its_wheel_needs(clone: Path, tmp_path: Path) -> None:
-    """It is built where npm's registry is reached, its wheel anywhere. Machine code is in the wheel
-    alone.
+    """The source archive is made with npm's registry, and the wheel of it without any network.
+
+    Machine code is in the wheel alone.
     """
     archive = [
         sys.executable,
@@ -210,7 +211,7 @@ def test_the_source_archive_has_what_its_wheel_needs(clone: Path, tmp_path: Path
 @pytest.mark.long
 @in_a_repository
 def test_a_wheel_that_would_have_no_studio_is_not_built(clone: Path, tmp_path: Path) -> None:
-    """What is left of an interrupted attempt, or is of other versions, counts as missing."""
+    """Leftovers of an interrupted build, or of other versions, count as missing."""
     source = copy_of(clone, tmp_path)
     page = source / "app" / "static" / "studio"
     page.mkdir(parents=True)
@@ -233,9 +234,7 @@ def deployment_steps() -> str:
 
 
 def test_what_the_deployment_page_copies_is_there() -> None:
-    """The steps that only root takes name files of the repository, and the unit runs what the
-    others install.
-    """
+    """The steps of root name files of the repository; the unit runs programs of the other steps."""
     left_out = [line for line in deployment_steps().splitlines() if line.startswith(OF_ROOT)]
     assert [line.split()[0] for line in left_out] == ["useradd", "cp", "cp", "nginx"]
     named = [word for line in left_out for word in line.split() if word.startswith("deploy/")]
@@ -249,9 +248,7 @@ def test_what_the_deployment_page_copies_is_there() -> None:
 @pytest.mark.timeout(2 * INSTALLED)
 @in_a_repository
 def test_the_deployment_page_is_followed(tmp_path: Path) -> None:
-    """Its steps, in folders of the test's own, make a service that computes, replays and shows the
-    studio.
-    """
+    """The page's steps, in folders of the test, make a service that computes, replays and shows."""
 
     def here(text: str) -> str:
         for path in DEPLOYED:
@@ -368,7 +365,7 @@ def test_a_service_under_a_locale_without_unicode(monkeypatch: pytest.MonkeyPatc
 def test_a_command_gives_a_hung_compiler_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It says so each time, and waits for it once."""
+    """The command reports the hung compiler each time, but waits for it only once."""
     compiler = tmp_path / "cc"
     compiler.write_text(
         f"#!/bin/sh\necho call >> {tmp_path}/calls\nexec sleep 1000\n", encoding="utf-8"
@@ -387,9 +384,7 @@ def test_a_command_gives_a_hung_compiler_up(
 
 @pytest.mark.long
 def test_a_scheduler_without_the_package_fails_no_job(tmp_path: Path) -> None:
-    """200 requests wait, whatever machines there are, and are done once there is a scheduler that
-    can read them.
-    """
+    """200 requests wait, whatever machines there are, until a scheduler can read them."""
     requests = [evaluation() for _ in range(200)]
     with ExitStack() as stack:
         empty = stack.enter_context(ExitStack())

@@ -1,6 +1,4 @@
-"""Requests as users send them, and what they may rely on in the answer: ends, warnings, ids, logs,
-payloads.
-"""
+"""Requests as sent by users, and the promises of answers: ends, warnings, ids, logs, payloads."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ from tests.app.requests import HOME, NEAR, PATIENT
 
 
 def pose(position: list[float]) -> dict[str, Any]:
-    """A pose that is not turned."""
+    """A pose without a turn."""
     return {"position": position, "quaternion": [0.0, 0.0, 0.0, 1.0]}
 
 
@@ -38,7 +36,7 @@ BALL = 86
 
 
 def depths(warnings: list[str]) -> dict[str, int]:
-    """Depth in the table [mm] by what is said to have no shape."""
+    """Depth in the table [mm] by the name of the shapeless part, tool or payload."""
     said = "\n".join(warnings)
     found = re.findall(
         r"The (tool|payload) has no shape.* would be (\d+) mm deep in table at \d\.\d{3} s", said
@@ -127,7 +125,7 @@ def test_a_payload_without_mass_needs_no_centre(client: TestClient) -> None:
 
 
 def test_an_id_of_the_caller_is_no_id_of_an_answer(client: TestClient) -> None:
-    """Even one that has the form of an answer's, of which another is kept."""
+    """The id of a request may even equal the id of another kept answer."""
     asked = {"start": {"q": HOME}, "goal": {"q": NEAR}, **PATIENT}
     first = client.post("/optimize", json=asked).json()
     second = client.post("/optimize", json=asked, headers={"X-Request-ID": first["id"]}).json()

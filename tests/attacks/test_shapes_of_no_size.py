@@ -1,6 +1,4 @@
-"""Shapes that claim no size: a collision check would never find them hit, and call a motion through
-them free.
-"""
+"""Shapes without a size: no collision check would ever find them hit, so they are refused."""
 
 from __future__ import annotations
 
@@ -101,7 +99,7 @@ def test_a_users_capsule_has_a_size(collision: Collision) -> None:
 
 
 def test_an_arm_whose_joints_are_in_one_place_needs_a_radius() -> None:
-    """The radius by the rule is a share of its length, which is zero."""
+    """The radius by the rule is a share of the arm's length, which is zero here."""
     urdf = URDF
     for part in ("0 0 0.4", "0 0 0.3", "0 0 0.2"):
         urdf = urdf.replace(f'<origin xyz="{part}"/>', "")

@@ -19,13 +19,13 @@ from tests.compilers import with_compiler
 from tests.optimizer.moves import GOAL, ROBOT, START, fixed, limits, problem
 from tests.selection import long_but
 
-# a move of which joint 6 is limited to so many rad/s, and the least energies [J] that are known of
-# it. These and those below are from spaces of four times the answer's control points
-# (`benchmarks.slow_moves.more_points`)
+# A move with joint 6 limited to so many rad/s, and the least known energies [J] of it. All least
+# energies of this file come from spaces with four times the answer's control points
+# (`benchmarks.slow_moves.more_points`).
 SLOW_START = np.array([0.5, -0.3, 0.4, -1.2, -1.1, 0.0])
 SLOW_GOAL = np.array([-0.5, -0.3, -0.4, -1.2, -1.1, 2.0])
 LEAST_KNOWN = {0.3: 331.8, 0.1: 823.9, 0.05: 1562.8, 0.02: 3783.0}
-# share of the shortest duration that is left for ramps slower than the limits of jerk allow
+# share of the shortest duration left for ramps slower than the limits of jerk allow
 RAMPS = 5e-3
 
 
@@ -82,7 +82,7 @@ def test_a_duration_next_to_the_shortest_is_kept(ratio: float) -> None:
 def test_much_more_time_than_a_move_needs_is_used(
     goal: Array, duration: float, least: float
 ) -> None:
-    """It goes to where holding costs less, and on in time, even if it only comes back."""
+    """The arm visits a posture with cheaper holding, even if it has to come back from it."""
     assert energy(optimize(problem(START, goal, **fixed(duration)))) < least * (1 + MOST_EXCESS)
 
 
@@ -94,9 +94,7 @@ def test_much_more_time_than_a_move_needs_is_used(
     ),
 )
 def test_other_buses_ramp_as_fast(bus: Bus) -> None:
-    """On an isolated bus power has a corner of its own for each joint, and finer motions are solved
-    one by one.
-    """
+    """Isolated buses have a corner of power for every joint and solve finer motions one by one."""
     task = slow(0.1, bus=bus)
     found = optimize(task)
     assert found.duration < shortest(task) * (1 + RAMPS)
@@ -113,8 +111,8 @@ def test_a_slow_tcp_is_within_its_limit_in_short_spans(index: int, speed: float)
     task = replace(task, arm=replace(task.arm, tcp_speed=speed))
     found = optimize(task)
     assert found.certificate.worst_ratio["tcp_speed"] <= 1 + 1e-6
-    # at a lower limit of speed there are no faster motions, so none that needs less time and less
-    # energy was missed
+    # A lower limit of speed allows no faster motions, so the search missed none of less time and
+    # energy.
     lower = optimize(replace(task, arm=replace(task.arm, tcp_speed=0.9 * speed)))
     assert energy(found) < energy(lower) * (1 + MOST_EXCESS)
 
@@ -124,7 +122,7 @@ PLACES = {
     "kr10_r1100": [0.0, -1.2, 1.3, 0.1, 0.4, 0.0],
     "panda": [0.0, -0.5, 0.2, -1.9, 0.1, 1.5, 0.3],
 }
-# relative: what a displacement of 1e-7 rad may add to the energy_of_displacement of standing still
+# relative: most that a displacement of 1e-7 rad may add to the energy_of_displacement at rest
 MORE = 2e-3
 # s: nothing here is to end by the deadline on a loaded machine
 DEADLINE = 60.0

@@ -49,7 +49,7 @@ MORE_READINGS = 12
 """Readings of the clock after the deadline: one that ends the reading, and those of whoever asks
 for the time left.
 """
-# a document, or a file, of a size that counts; what becomes of it
+# a document or file of a given size, and its expected fate
 DOCUMENTS: dict[str, tuple[Callable[[int], str], str]] = {
     "open comments": (lambda n: "<robot>" + "<!--" * n, "not XML"),
     "comments": (
@@ -97,9 +97,7 @@ DOCUMENTS: dict[str, tuple[Callable[[int], str], str]] = {
 
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_a_urdf_that_holds_too_much_is_refused_at_once(name: str) -> None:
-    """Each took seconds to minutes, or the worker, by the time that a request's body may hold as
-    much.
-    """
+    """Such a file of the size of a request's body once took seconds to minutes, or the worker."""
     make, words = DOCUMENTS[name]
     with pytest.raises(InvalidArm, match=words) as found:
         own_figures("mine", changed(urdf=make(300_000)))
@@ -136,7 +134,7 @@ def test_what_public_urdfs_contain_is_no_fault(made: Callable[[str], str]) -> No
 
 
 def assert_read_alike(urdf: str) -> None:
-    """A URDF gives the figures of the plain one; only elements that count for nothing are named."""
+    """A URDF gives the figures of the plain one; remarks name only elements without effect."""
     document, remarks = own_figures("mine", changed(urdf=urdf))
     plain, others = own_figures("mine", PLAIN)
     assert document == plain
@@ -239,7 +237,7 @@ def test_an_obj_that_is_none_or_too_large_is_refused(content: bytes) -> None:
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> CountingClock:
-    """The clock of all deadlines, which moves by itself whenever it is read."""
+    """The clock of all deadlines, moving at every reading."""
     clock = CountingClock()
     monkeypatch.setattr(
         Deadline, "after", lambda seconds, _=None: Deadline(clock() + seconds, clock)
@@ -262,7 +260,7 @@ def log_file() -> bytes:
 
 
 def late_tasks(log: bytes, folder: Path) -> Iterator[tuple[str, Any]]:
-    """Tasks of all endpoints that take an upload."""
+    """Tasks of all endpoints with an upload."""
     path = folder / "upload.csv"
     path.write_bytes(log)
     many = CORNERS + b"v 0 0 1\n" + b"f 1 2 3\nf 2 3 4\n" * (30 * LIMITS.mesh_lines)
@@ -304,7 +302,7 @@ def late_tasks(log: bytes, folder: Path) -> Iterator[tuple[str, Any]]:
 def test_what_is_read_ends_at_its_deadline(
     clock: CountingClock, log_file: bytes, tmp_path: Path
 ) -> None:
-    """With the typed error, and at once; whatever ran it goes on."""
+    """Reading stops at once with the typed error, whichever task it is part of."""
     for name, task in late_tasks(log_file, tmp_path):
         began = clock.now
         with pytest.raises(DeadlineExceeded):

@@ -1,6 +1,4 @@
-"""The studio page in a browser, and what every test asks of it: no error in its console, no request
-to elsewhere.
-"""
+"""The studio page in a browser, with checks of every test: no console error, no foreign request."""
 
 from __future__ import annotations
 
@@ -24,7 +22,7 @@ SHOWN = (
     "() => Boolean(window.studio?.state.answered && !studio.state.run && "
     "(window.studio.view?.frames ?? 1))"
 )
-# what is drawn from figures has texture coordinates, the meshes have none
+# Parts drawn from figures have texture coordinates, meshes have none.
 MESHES = (
     "() => Boolean(window.studio?.view?.arms.length) && "
     "!studio.view.arms[0].drawn[0].geometry.hasAttribute('uv')"
@@ -132,7 +130,7 @@ def go(page: Page, name: str) -> None:
 
 
 def findings(page: Page) -> list[str]:
-    """Serious findings of axe on what is seen."""
+    """Serious findings of axe on the visible page."""
     page.evaluate(AXE)
     found = page.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
     return [
@@ -146,8 +144,10 @@ def findings(page: Page) -> list[str]:
 def opened(
     browser: Browser, url: str, tolerated: str = "status of (4|504)", **options: Any
 ) -> Iterator[Page]:
-    """A page of a fresh context, at 1280 x 800, whose errors and foreign requests fail the test,
-    unless the text of an error has the pattern of the tolerated ones."""
+    """A page of a fresh context of 1280 x 800; errors and foreign requests fail the test.
+
+    An error is tolerated if its text has the given pattern.
+    """
     options = {"viewport": {"width": 1280, "height": 800}, "reduced_motion": "reduce", **options}
     context = browser.new_context(accept_downloads=True, **options)
     page = context.new_page()
@@ -167,7 +167,7 @@ def opened(
     page.goto(url)
     yield page
     context.close()
-    # Chromium itself says of a refused request that it failed: that is what these tests provoke.
-    # On a busy machine, a posture may pass the deadline of its motion.
+    # Chromium itself reports a refused request as failed, and these tests provoke refusals. On a
+    # busy machine, a posture may pass the deadline of its motion.
     left = [fault for fault in faults if not re.search(tolerated, fault)]
     assert not left, left

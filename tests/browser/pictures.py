@@ -1,7 +1,7 @@
 """Makes the pictures of docs/reference/studio.md: `python -m tests.browser.pictures`.
 
-They are of a service that it starts, with its own examples, a job of moves between a grid of poses,
-and a simulated log.
+The pictures show a service of this module with its own examples, a job of moves between a grid of
+poses, and a simulated log.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def main() -> None:
 
 
 def picture(page: Page, name: str) -> None:
-    """Write what is seen once it is still."""
+    """Writes a picture of the page once it is still."""
     page.wait_for_timeout(SETTLED)
     page.screenshot(path=DOCS / f"{name}.png")
 
@@ -119,7 +119,7 @@ def of_places(page: Page) -> None:
 
 
 def of_a_job(page: Page) -> None:
-    """A table of moves, one of which has no answer, with intervals and savings."""
+    """A table of moves, one of them without an answer, with intervals and savings."""
     ask(page, FIRST)
     go(page, "Jobs")
     page.locator("#new-job").click()
@@ -134,7 +134,7 @@ def of_a_job(page: Page) -> None:
 
 
 def of_an_identification(page: Page) -> None:
-    """The figures that a simulated log tells."""
+    """The figures identified from a simulated log."""
     robot = load_robot("ur5e")
     go(page, "Logs")
     with tempfile.TemporaryDirectory() as folder:

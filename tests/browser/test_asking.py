@@ -1,5 +1,5 @@
-"""The studio page in a real browser: how one asks, by the task panel, by JSON and by hand, and what
-is said of errors.
+"""The studio page in a real browser: requests by the task panel, by JSON and by hand, and
+errors.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ ROUNDING = 1e-9  # s; sums of times in double precision
 pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
 GHOSTS = "() => studio.view.parts.ghosts.children.length"
-# where the flange of the last ghost is drawn, and where it is at the best goal so far
+# position of the last ghost's flange as drawn, and at the best goal so far
 BEST = """() => {
     const { parts, chain } = studio.view;
     const flange = parts.ghosts.children.at(-1).children.at(-1).matrix.clone().transpose();
@@ -66,7 +66,7 @@ def test_a_wrong_request_is_explained(page: Page) -> None:
     expect(page.locator("#optimise")).to_be_enabled()
 
 
-# of wrong types, at places that the form, the handles and the picture read
+# values of wrong types, at places read by the form, the handles and the picture
 WRONG: list[dict[str, Any]] = [
     {"start": 3},
     {"start": {"q": "x"}},
@@ -86,7 +86,7 @@ WRONG: list[dict[str, Any]] = [
 
 
 def test_values_of_wrong_types_are_shown(page: Page) -> None:
-    """Until the service says what is wrong with them, in the panel as it is sent from JSON."""
+    """The panel keeps wrong values as sent from JSON, until the service reports the error."""
     for wrong in WRONG:
         body = {**FIRST, **wrong}
         fill_json(page, body)
@@ -105,7 +105,7 @@ def test_values_of_wrong_types_are_shown(page: Page) -> None:
 
 
 def test_the_panel_keeps_every_example(page: Page) -> None:
-    """What the panel shows, it does not change; what is changed in it comes back."""
+    """The panel leaves an example unchanged, and an edit in the panel reaches the request."""
     for name, body in EXAMPLES.items():
         fill_json(page, body)
         show_json(page, False)
@@ -143,7 +143,7 @@ def test_a_goal_is_dragged_and_a_box_is_drawn(browser: Browser, service: Server)
         page.mouse.move(x, y)
         page.mouse.down()
         page.mouse.move(x - 8, y - 8, steps=3)
-        # at once, while the button is held: in words, and as a ghost where the hand would be
+        # at once, with the button held: in words, and as a ghost at the pose of the hand
         expect(page.locator("#drag-note")).to_contain_text("Reached by")
         until(page, f"() => ({GHOSTS})() === 3")
         drawn, chain = page.evaluate(BEST)
@@ -175,7 +175,7 @@ def test_progress_is_shown_and_cancelled(page: Page, service: Server) -> None:
     fill_json(page, long_search(100.0))
     page.locator("#optimise").click()
     expect(page.locator("#progress-text")).to_contain_text("Best so far")
-    # the goal, and the best goal so far, where the service says
+    # the goal and the best goal so far, at the positions reported by the service
     until(page, "() => Boolean(studio.state.run?.incumbents.length)")
     drawn, chain = page.evaluate(BEST)
     assert drawn == pytest.approx(chain)
@@ -218,7 +218,7 @@ def test_a_cycle_is_played_as_one(browser: Browser, service: Server, page: Page)
 
 
 def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:
-    """The part that is grasped: at its stop and on the lines in and out of it."""
+    """The grasped part is faint at its stop and on the lines in and out of it."""
     ask(page, json.loads((ROOT / "examples" / "cycle" / "out_of_a_tray.json").read_text()))
     names = page.evaluate(
         "() => studio.view.parts.obstacles.children.map(({ userData }) => userData.name)"

@@ -1,6 +1,4 @@
-"""The documentation page in a browser: its Authorize button gives the key to the requests that it
-sends.
-"""
+"""The documentation page in a browser: its Authorize button adds the key to its requests."""
 
 from __future__ import annotations
 
@@ -28,7 +26,7 @@ POST = """([url, mode, key]) => fetch(url + "/studies", {
 
 @pytest.fixture(scope="module")
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, str]]:
-    """A service that needs keys, and a key."""
+    """A service with keys, and a key."""
     file: Path = tmp_path_factory.mktemp("keys") / "keys.yaml"
     secret = add(file, "press")
     with serving(recorded=True, api_keys_file=file) as server:

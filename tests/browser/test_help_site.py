@@ -1,6 +1,4 @@
-"""The pages at `/help` in a browser: nothing from elsewhere, nothing that their policy forbids, and
-a search that finds.
-"""
+"""The pages at `/help` in a browser: no foreign request, nothing against their policy, a search."""
 
 from __future__ import annotations
 
@@ -21,7 +19,7 @@ PAGES = ("", "start/first_saving/", "how_to/", "how_to/work_cycle/", "reference/
 
 @pytest.fixture(scope="module")
 def page(browser: Browser, service: Server) -> Iterator[Page]:
-    """The first page. What its console says, and what it asks of other hosts, fails the tests."""
+    """The first page; messages on its console and requests to other hosts fail the tests."""
     with opened(browser, f"{service.url}/help/") as page:
         yield page
 

@@ -1,6 +1,4 @@
-"""The studio page in a real browser: from a log to figures, their residuals, and a motion computed
-with them.
-"""
+"""The studio page in a real browser: from a log to figures, residuals, and a motion with them."""
 
 from __future__ import annotations
 
@@ -43,7 +41,7 @@ def last(service: Server) -> dict[str, Any]:
 
 
 def shown_rms(page: Page, name: str) -> float:
-    """What the page says of the residuals of one curve."""
+    """The residuals of one curve, as shown on the page."""
     title = page.locator("#identification h4", has_text=re.compile(rf"^{name}")).inner_text()
     found = re.search(r"residual ([\d.]+)", title)
     assert found is not None, title
@@ -107,9 +105,7 @@ def test_a_log_becomes_figures_that_the_next_motion_has(
 
 
 def test_moves_are_chosen_and_those_held_out_are_named(browser: Browser, service: Server) -> None:
-    """On a phone, from the lists of what is kept, as a job and by itself; the log was deleted
-    meanwhile.
-    """
+    """On a phone, identifications are opened from the lists, after the deletion of their log."""
     with opened(browser, f"{service.url}/studio", viewport={"width": 390, "height": 844}) as page:
         until(page, SHOWN)
         body = csv_of(recorded(ROBOT, TRUTH, moves=4, seed=3), without="P")
@@ -167,7 +163,7 @@ def test_what_a_log_does_not_tell_is_explained(page: Page, tmp_path: Path) -> No
 def test_measured_joules_stand_beside_those_that_are_predicted(
     page: Page, service: Server, tmp_path: Path
 ) -> None:
-    """Of each move of a log with power and currents, and of the whole of it."""
+    """Measured and predicted joules are shown for every move of a log and for the whole log."""
     file = tmp_path / "tuesday.csv"
     file.write_bytes(csv_of(recorded(ROBOT, TRUTH, moves=3, seed=5)))
     add_log(page, file)

@@ -1,4 +1,4 @@
-"""The studio page in a real browser: whatever is kept is renamed, found and deleted alike."""
+"""The studio page in a real browser: all kept things are renamed, found and deleted alike."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.identification_logs import csv_of, recorded, truth_of
 pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
 ROBOT = load_robot("ur5e")
-# every text that is shown of an identification that runs
+# every text shown of a running identification
 NOTE_PROGRESS = """() => {
     window.told = [];
     new MutationObserver(() => {
@@ -57,7 +57,7 @@ def add_robot(service: Server) -> str:
 
 
 KEPT: dict[str, tuple[Callable[[Server], str], str, str, str]] = {
-    # how it is made, its page, its list, and the field that searches it
+    # how to make it, its page, its list, and its search field
     "studies": (add_study, "Library", "#studies li", "Search studies"),
     "robots": (add_robot, "Library", "#own-robots li", "Search your robots"),
     "jobs": (add_job, "Jobs", "#jobs .side li", "Search jobs"),
@@ -103,7 +103,7 @@ def test_it_is_renamed_found_and_deleted(browser: Browser, service: Server, thin
 
 
 def oldest_of_two(page: Page, rows: str) -> Locator:
-    """Of the two that a test has added, the first one: lists are newest first."""
+    """The older of the two items added by a test: lists are newest first."""
     return page.locator(rows).nth(1)
 
 
@@ -126,7 +126,7 @@ def test_a_project_is_renamed_where_it_is_found(browser: Browser, service: Serve
 
 
 def test_the_time_left_of_an_identification_is_told(browser: Browser, service: Server) -> None:
-    """Each of twenty motions held out in its turn: of twenty-one fits, most are still ahead."""
+    """Twenty motions are held out in turn: of twenty-one fits, most are still ahead."""
     log = add_log(service, moves=20)
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)

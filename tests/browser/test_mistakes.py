@@ -1,6 +1,4 @@
-"""The studio page in a real browser: each mistake leads to a sentence at the field that caused it,
-and nothing is lost by it.
-"""
+"""The studio page: a mistake leads to a sentence at its field, and no input is lost."""
 
 from __future__ import annotations
 
@@ -32,7 +30,7 @@ CELL = "ancestor::*[self::section or self::li or contains(@class, 'target')][1]"
 
 
 def part_of(cell: Locator) -> Locator:
-    """The part of the form to which a cell belongs."""
+    """The part of the form with this cell."""
     return cell.locator(f"xpath={CELL}")
 
 
@@ -74,7 +72,7 @@ def test_a_group_that_is_shut_opens_for_its_mistake(page: Page) -> None:
 
 
 def test_without_the_service_nothing_is_lost(browser: Browser, service: Server) -> None:
-    """A sentence at the button; what was typed is answered when the service is there again."""
+    """A sentence appears at the button; the input is answered once the service is back."""
     url = f"{service.url}/studio"
     with opened(browser, url, tolerated=OFFLINE) as page:
         until(page, SHOWN)
@@ -91,7 +89,7 @@ def test_without_the_service_nothing_is_lost(browser: Browser, service: Server) 
 
 
 def test_numbers_that_are_none_are_refused_at_their_cells(page: Page) -> None:
-    """What was typed stays, with a sentence, and nothing is computed until it is a number."""
+    """The typed text stays, with a sentence, and nothing is computed until it is a number."""
     fill_json(page, FIRST)
     show_json(page, False)
     cell = page.locator("[data-pointer='/payload/mass']")
@@ -140,7 +138,9 @@ def test_prices_and_times_that_are_none_are_refused_where_they_stand(page: Page)
 def test_what_the_service_cannot_tell_is_said_where_it_is_missing(
     browser: Browser, service: Server
 ) -> None:
-    """Figures of a gripper, and what is kept: an empty list is not claimed."""
+    """Without the figures of a gripper or the list of kept things, the page claims no
+    empty list.
+    """
     with opened(browser, f"{service.url}/studio", tolerated=OFFLINE) as page:
         until(page, SHOWN)
         page.locator("#tool-fold > summary").click()
@@ -161,7 +161,7 @@ def test_what_the_service_cannot_tell_is_said_where_it_is_missing(
 
 
 def test_a_file_that_is_no_arm_is_told_at_the_file(browser: Browser, service: Server) -> None:
-    # Chromium's own report of a file that is no XML has a style, which the page's policy forbids.
+    # Chromium's own report on invalid XML has a style forbidden by the page's policy.
     with opened(browser, f"{service.url}/studio", tolerated="Applying inline style") as page:
         until(page, SHOWN)
         page.locator("#change-robot").click()

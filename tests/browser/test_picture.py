@@ -30,7 +30,7 @@ DRAWN = 1e-6  # m; the certificate's own tolerance of an end
 
 
 def test_the_picture_is_of_the_motion(page: Page) -> None:
-    """At both ends the TCP is drawn where the request wants it."""
+    """At both ends, the TCP is drawn at the pose of the request."""
     for time, end in ((0.0, "start"), (state(page, "duration"), "goal")):
         pose = FIRST[end]["pose"]
         turn = "quaternion" if "quaternion" in pose else "rpy"
@@ -78,9 +78,7 @@ def test_the_nearest_points_are_those_of_the_certificate(page: Page) -> None:
 
 
 def test_the_makers_meshes_are_drawn(browser: Browser, service: Server, page: Page) -> None:
-    """Where the service has them; else the arm is drawn from its figures, and the page says
-    nothing.
-    """
+    """Without the meshes in the service, the arm is drawn from its figures, without a message."""
     with_meshes = page.evaluate(PIXELS)
     with opened(browser, f"{service.url}/studio") as other:
         other.route(
@@ -104,9 +102,7 @@ def test_the_makers_meshes_are_drawn(browser: Browser, service: Server, page: Pa
 
 
 def test_what_stands_before_the_arm_fades(page: Page) -> None:
-    """The side of the shelf, seen through it; what stands behind the arm, or is not to fade, does
-    not.
-    """
+    """Only the side of the shelf in front of the arm fades, and only if fading is on."""
     faint = """show => {
         const { view } = studio;
         const { position } = view.camera;
@@ -129,8 +125,8 @@ def test_what_stands_before_the_arm_fades(page: Page) -> None:
 
 
 def test_a_coarse_picture_has_no_shadows(page: Page) -> None:
-    """On a machine without a graphics card they take half the time of a moving picture. A still one
-    has them again.
+    """Without a graphics card, shadows take half the time of a moving picture; a still one has
+    them.
     """
     drawn = """fineness => {
         const { view } = studio;
@@ -155,7 +151,7 @@ def test_an_obstacle_under_the_pointer_tells_its_name_and_margin(page: Page) -> 
     }""")
     assert page.evaluate(shells) == 0
 
-    # a scene that was drawn anew meanwhile has its shell again when the pointer moves
+    # A scene drawn anew in the meantime has its shell again at the next move of the pointer.
     def shown(k: int) -> bool:
         page.mouse.move(x + k % 2, y)
         return bool(page.evaluate(shells) == 1)

@@ -1,4 +1,4 @@
-"""The studio page in a real browser: where to put the robot."""
+"""The studio page in a real browser: the best place of the robot."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def open_panel(page: Page) -> None:
 
 
 def look_at(page: Page, name: str, value: str) -> None:
-    """Types a number of the place that is looked at."""
+    """Types a number of the place under inspection."""
     cell = page.locator("#place-looked").get_by_label(name)
     cell.fill(value)
     cell.press("Enter")
@@ -112,7 +112,7 @@ def look_at(page: Page, name: str, value: str) -> None:
 
 @pytest.fixture(scope="module")
 def found(browser: Browser, service: Server) -> Iterator[Page]:
-    """The page with a map of nine places, of which that of the robot is one."""
+    """The page with a map of nine places, one of them the robot's own."""
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
         ask(page, ROUND)
@@ -131,7 +131,7 @@ def test_the_map_is_seen_and_its_best_place_is_looked_at(found: Page) -> None:
     assert looked["energy"] == pytest.approx(best["energy"])
     there = looked["motion"]["asked"]
     assert same(cycle(there), cycle(best["cycles"][0]["request"]))
-    # the base of the arm is drawn where the answer says
+    # the drawn base is at the position of the answer
     drawn = found.evaluate("() => studio.view.parts.arms.matrix.elements.slice(12, 15)")
     assert drawn == pytest.approx(best["base"]["position"], abs=ROUNDING)
     expect(found.locator("#place-legend")).to_contain_text("Energy at each place")
@@ -228,7 +228,7 @@ def test_a_keyboard_is_enough(found: Page) -> None:
 
 
 def test_what_is_sent_is_what_the_library_says(browser: Browser, service: Server) -> None:
-    """Every form of a pose, seen from a place that is moved and turned."""
+    """The page transforms every form of a pose to a moved and turned base as the library does."""
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
         fill_json(page, EVERY_FORM)
@@ -256,7 +256,7 @@ def same(one: Cycle, other: Cycle) -> bool:
 
 
 def numbers(given: Cycle) -> list[float]:
-    """Everything of a cycle that depends on the place of the base."""
+    """All numbers of a cycle that depend on the place of the base."""
     found = [given.arm.gravity, *(each.T_base_shape for each in given.arm.scene.obstacles)]
     if given.arm.tool_cone is not None:
         found.append(given.arm.tool_cone.direction)

@@ -1,5 +1,5 @@
-"""Whether the page can be read: contrast in light and dark, letters of twice the size, what axe
-finds.
+"""Readability of the page: contrast in light and dark, letters of twice the size,
+findings of axe.
 """
 
 from __future__ import annotations
@@ -25,8 +25,7 @@ pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 CONTROLS = {"#optimise": "Task", "#play": "Picture", "#scrub": "Picture", "#joules": "Answer"}
 """Controls, and the tab of a narrow page that has them."""
 LEAST = 4.5  # contrast of text, WCAG 2.2, 1.4.3
-# texts that are shown, and their contrast with what is behind them: the nearest grounds, laid over
-# each other
+# visible texts with their contrast against the blended grounds behind them
 CONTRASTS = """() => {
     const canvas = Object.assign(document.createElement("canvas"), { width: 1, height: 1 });
     const pen = canvas.getContext("2d", { willReadFrequently: true });
@@ -57,8 +56,7 @@ CONTRASTS = """() => {
     }
     return found;
 }"""
-# pairs of controls and headings of which one covers the other, and those that are cut at the edge
-# of the page
+# overlapping pairs of controls and headings, and controls cut at the edge of the page
 CROWDED = """() => {
     const kinds = "h1, h2, button, .button, select, summary, label, #joules, #facts";
     const all = [...document.querySelectorAll(kinds)]
@@ -97,7 +95,7 @@ def test_every_text_stands_out(browser: Browser, service: Server, scheme: str) -
 
 
 def texts(page: Page, least: int) -> None:
-    """So many texts are shown, and each stands out."""
+    """At least so many texts are visible, all with sufficient contrast."""
     found = page.evaluate(CONTRASTS)
     assert len(found) >= least
     assert not [(text, round(ratio, 2)) for text, ratio in found if ratio < LEAST]

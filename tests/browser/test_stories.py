@@ -1,6 +1,4 @@
-"""The studio page in a real browser: what people come for, from the first minute to the result that
-they take away.
-"""
+"""The studio page in a real browser: tasks of users, from the first minute to the saved result."""
 
 from __future__ import annotations
 
@@ -53,7 +51,7 @@ def paste(page: Page, text: str, reading: str = RADIANS) -> None:
 
 
 def report(page: Page, kind: Literal["html", "pdf"]) -> bytes:
-    """The report of what is shown, as a file."""
+    """The report of the shown result, as a file."""
     names = {"html": "Page (HTML)", "pdf": "PDF, to print"}
     page.locator("#report > summary").click()
     with page.expect_download() as download:
@@ -209,7 +207,7 @@ def test_a_researcher_brings_an_own_arm(browser: Browser, service: Server, tmp_p
 
 
 def test_a_researcher_takes_a_front(browser: Browser, service: Server) -> None:
-    """The least energy of each duration, as a table whose least one is the answer."""
+    """A front gives the least energy of every duration, and its table's least one is the answer."""
     lift = json.loads((ROOT / "examples" / "pareto" / "lift.json").read_text())
     asked = {name: value for name, value in lift.items() if name not in ("points", "duration")}
     with opened(browser, f"{service.url}/studio") as page:
@@ -311,7 +309,9 @@ def test_an_engineer_reports_to_those_who_decide(page: Page) -> None:
 def test_an_engineer_compares_a_log_with_what_was_predicted(
     browser: Browser, service: Server, tmp_path: Path
 ) -> None:
-    """Joules of each move, measured beside predicted, on the page and in a report that checks."""
+    """The joules of every move stand beside their prediction, on the page and in a
+    verified report.
+    """
     file = tmp_path / "monday.csv"
     file.write_bytes(csv_of(recorded(ROBOT, truth_of(ROBOT), moves=3)))
     with opened(browser, f"{service.url}/studio") as page:

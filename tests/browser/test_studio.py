@@ -1,4 +1,4 @@
-"""The studio page in a real browser: what it shows is what the service answered."""
+"""The studio page in a real browser shows the answers of the service."""
 
 from __future__ import annotations
 
@@ -163,7 +163,9 @@ def test_a_broken_link_says_so(browser: Browser, page: Page) -> None:
 
 
 def test_branches_side_by_side(page: Page) -> None:
-    """A branch that the search ruled out: as a ghost, then as a second arm on the same clock."""
+    """A branch ruled out by the search appears as a ghost, then as a second arm on the
+    same clock.
+    """
     ask(page, {**FIRST, "branch": {"shoulder": "left", "elbow": "up"}, "candidates": "all"})
     page.locator("#branches > summary").click()
     rows = page.locator("#branches tbody tr")
@@ -185,8 +187,9 @@ def test_branches_side_by_side(page: Page) -> None:
 
 
 def test_postures_are_computed_unasked(page: Page) -> None:
-    """Each with its joints in degrees and the energy that it needs when it is asked for alone; one
-    of them races against the answer.
+    """Every posture appears with its joints in degrees and its energy when requested alone.
+
+    One posture races against the answer.
     """
     ask(page, FIRST)
     until(page, "() => studio.state.postures?.every(({ state }) => state !== 'computing')")

@@ -1,6 +1,4 @@
-"""`deploy/backup.sh`: a copy that is made under load has all that was acknowledged before, and a
-service runs on it.
-"""
+"""`deploy/backup.sh`: a backup under load has all acknowledged data, and a service runs on it."""
 
 from __future__ import annotations
 
@@ -34,7 +32,7 @@ def begin(server: Server, name: str) -> str:
 
 
 def back_up_under_load(server: Server, url: str, file: Path) -> list[str]:
-    """The ids that were acknowledged before the backup began; others are written while it runs."""
+    """The ids acknowledged before the start of the backup; writing goes on during its run."""
     before = [begin(server, f"before {k}") for k in range(BEFORE)]
     enough, stop = threading.Event(), threading.Event()
     written = 0
@@ -63,7 +61,7 @@ def back_up_under_load(server: Server, url: str, file: Path) -> list[str]:
 
 
 async def assert_all_there(url: str, ids: list[str]) -> None:
-    """As the service reads them, from a database that it migrates if need be."""
+    """The service reads all ids from the database, after a migration if necessary."""
     async with opened(url) as store:
         for id in ids:
             await store.read(partial(studies.history, study_id=id))

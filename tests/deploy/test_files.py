@@ -1,6 +1,4 @@
-"""The files of `deploy/`: well-formed, true to the settings, and checked by the programs that read
-them.
-"""
+"""The files of `deploy/`: well-formed, true to the settings, and accepted by their programs."""
 
 from __future__ import annotations
 
@@ -31,20 +29,20 @@ UNITS = {"s": 1, "m": 60, "h": 3600}
 
 
 def nginx(name: str) -> list[dict[str, Any]]:
-    """The directives of a file; what is unknown, or at a wrong place, is an error."""
+    """The directives of a file; an unknown or misplaced directive is an error."""
     parsed = crossplane.parse(str(DEPLOY / "nginx" / name), check_ctx=False)
     assert parsed["errors"] == []
     return parsed["config"][0]["parsed"]
 
 
 def inside(block: list[dict[str, Any]], name: str) -> list[list[str]]:
-    """The arguments of each directive of this name in a block, not in the blocks inside."""
+    """The arguments of each directive of this name in a block, without the blocks inside."""
     return [each["args"] for each in block if each["directive"] == name]
 
 
 @pytest.fixture(scope="module")
 def tls() -> list[dict[str, Any]]:
-    """The server that speaks TLS."""
+    """The server with TLS."""
     (server,) = (
         each["block"]
         for each in nginx("joulepath.conf")
@@ -132,7 +130,7 @@ def test_compose_keeps_the_cluster_apart(compose: dict[str, Any]) -> None:
 
 
 def test_the_image_is_made_of_what_its_context_has(compose: dict[str, Any]) -> None:
-    """What `.dockerignore` leaves out can neither be copied, nor be in the wheel or on a page."""
+    """Files left out by `.dockerignore` can neither be copied, nor be in the wheel or on a page."""
     sent = [
         line[1:]
         for line in (ROOT / ".dockerignore").read_text().splitlines()

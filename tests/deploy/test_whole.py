@@ -1,4 +1,4 @@
-"""What `deploy/compose.yaml` describes, from plain processes: nginx with TLS, two services, one
+"""The setting of `deploy/compose.yaml` from plain processes: nginx, two services, one
 PostgreSQL.
 """
 
@@ -101,8 +101,8 @@ def configuration(folder: Path, port: int, services: list[str]) -> Path:
 
 @contextmanager
 def nginx(folder: Path, services: list[str]) -> Iterator[tuple[str, httpx2.Client]]:
-    """nginx with the certificate in `folder`, in front of two services: its URL, and a client that
-    trusts it.
+    """nginx with the certificate in `folder`, in front of two services: its URL and a trusting
+    client.
     """
     port = free_port()
     main = configuration(folder, port, services)
@@ -148,7 +148,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Whole]:
 
 @pytest.fixture(scope="module")
 def key(whole: Whole) -> dict[str, str]:
-    """The header with a key that is made while the services run."""
+    """The header with a key made while the services run."""
     return {"Authorization": f"Bearer {add(whole.keys, 'press')}"}
 
 

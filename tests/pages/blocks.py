@@ -1,8 +1,8 @@
-"""Fenced blocks of pages, and a run of them as a reader would type them.
+"""Fenced blocks of pages, and their run as a reader would type them.
 
 Blocks with a title are files. Blocks in `bash` and `python` run in their order, in one folder, all
-Python of a page in one process; a `text` block behind them is what they print. Blocks marked
-`{data-run="no"}` need what a test does not have, such as root: their syntax is checked.
+Python of a page in one process; a following `text` block is their expected output. Blocks marked
+`{data-run="no"}` need something absent from a test, such as root: only their syntax is checked.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ for line in sys.stdin:
     print(chr(0), end="", flush=True)
 """
 
-# installs nothing: what a page installs must be among the packages for developers
+# Installs nothing: packages installed by a page must be among the packages for developers.
 _PIP = """-c 'import importlib.metadata as found, sys
 assert sys.argv[1] == "install"
 [found.version(each) for each in sys.argv[2:] if not each.startswith("-")]'"""
@@ -39,7 +39,7 @@ assert sys.argv[1] == "install"
 
 @dataclass(frozen=True)
 class Block:
-    """A fenced block: the words after the fence, and what is inside."""
+    """A fenced block: the words after the fence, and the text inside."""
 
     words: str
     code: str
@@ -68,7 +68,7 @@ def blocks_of(page: Path) -> list[Block]:
 
 
 def run(page: Path, folder: Path, service: str = SERVICE) -> None:
-    """Do what a page says, in a folder; fail where the page prints something else."""
+    """Runs a page in a folder and fails at output that differs from the page."""
     environment = _environment(folder, service)
     printed = ""
     with subprocess.Popen(
@@ -94,8 +94,7 @@ def run(page: Path, folder: Path, service: str = SERVICE) -> None:
 
 
 def assert_like(printed: str, said: str) -> None:
-    """Words must be equal; numbers, whose last digits depend on the machine, within 2 %. `…` stands
-    for anything."""
+    """Words must be equal; numbers may differ by 2 % between machines; `…` stands for any text."""
     words, expected = " ".join(printed.split()), " ".join(said.split())
     numbers = _NUMBER.findall(expected)
     texts = (re.escape(text).replace("…", ".*?") for text in _NUMBER.split(expected))
@@ -109,7 +108,9 @@ def assert_like(printed: str, said: str) -> None:
 
 
 def _environment(folder: Path, service: str) -> dict[str, str]:
-    """With `joulepath` and `python` of this environment, on a terminal that draws nothing."""
+    """Variables with `joulepath` and `python` of this environment, on a terminal without
+    graphics.
+    """
     programs = folder / ".programs"
     programs.mkdir()
     commands = {"joulepath": "-m joulepath.app.cli", "python": "", "python3": "", "pip": _PIP}

@@ -1,8 +1,7 @@
-"""The commands, the requests and the imports of all pages, without what they compute: what a page
-names is there, and accepts what the page gives it.
+"""Commands, requests and imports of all pages fit the product; results are not computed here.
 
-`make test-long` runs most pages; this sees at once that a command, an option, a path, a field or a
-name has another name than a page says.
+`make test-long` runs most pages. This quick test finds a renamed command, option, path, field or
+name.
 """
 
 from __future__ import annotations
@@ -70,12 +69,12 @@ def commands_of(page: Path, program: str) -> Iterator[list[str]]:
 
 
 def pages_with(program: str) -> list[Path]:
-    """The pages that call a program."""
+    """The pages with a call of a program."""
     return [page for page in PAGES if any(commands_of(page, program))]
 
 
 def check_body(path: str, method: str, body: Any) -> None:
-    """The document of the service has the operation, whose schema the body fulfils."""
+    """The body fulfils the schema of the operation in the service's OpenAPI document."""
     document = open_document()
     operation = document["paths"][path][method]
     content = operation["requestBody"]["content"]["application/json"]
@@ -83,7 +82,7 @@ def check_body(path: str, method: str, body: Any) -> None:
 
 
 def given_file(page: Path, name: str) -> str | None:
-    """The text of a file that the repository has or the page writes; None for another one."""
+    """The text of a file of the repository or of the page; None for another file."""
     written = {block.title: block.code for block in blocks_of(page) if block.title}
     example = ROOT / name
     return written.get(name) or (example.read_text("utf-8") if example.is_file() else None)
@@ -106,7 +105,7 @@ def test_the_command_line_accepts_the_commands(page: Path, monkeypatch: pytest.M
 
 @by_page(argvalues=pages_with("curl"))
 def test_the_service_has_what_curl_asks_for(page: Path) -> None:
-    """On this machine: the path, the method, the query, and what the page has of the body."""
+    """Requests to this machine have a known path, method and query, and a valid body."""
     for arguments in commands_of(page, "curl"):
         given, _ = CURL.parse_known_args(arguments)
         url = urlsplit(given.url)
@@ -124,7 +123,7 @@ def test_the_service_has_what_curl_asks_for(page: Path) -> None:
 
 
 def json_of(page: Path) -> list[dict[str, Any]]:
-    """The JSON that a page shows as a whole, which is in no file."""
+    """Complete JSON of a page outside any file."""
     shown = (block for block in blocks_of(page) if block.language == "json" and not block.title)
     return [json.loads(block.code) for block in shown if "…" not in block.code]
 
@@ -151,7 +150,7 @@ def python_of(page: Path) -> Iterator[str]:
 
 
 def names_of(page: Path) -> Iterator[tuple[str, str]]:
-    """Module and name of all that the Python of a page takes from joulepath."""
+    """Module and name of every import from joulepath in the Python of a page."""
     for code in python_of(page):
         tree = ast.parse(code.replace("…", "..."))
         for node in ast.walk(tree):

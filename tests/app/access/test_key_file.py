@@ -1,5 +1,5 @@
-"""The file of API keys holds hashes only and changes one change at a time; the rules say which role
-may do what.
+"""The file of API keys holds hashes only and takes one change at a time; rules give roles
+rights.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the service says and refuses when it starts."""
+"""Messages and refusals of the service at its start."""
 
 from __future__ import annotations
 

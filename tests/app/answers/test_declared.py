@@ -1,4 +1,4 @@
-"""Answers from what classes declare: JSON, and the schema that it keeps to."""
+"""JSON of answers and its schema, both from declarations of classes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from tests.app.live import ROOT
 
 
 class Place(NamedTuple):
-    """Where."""
+    """A place."""
 
     x: Annotated[float, Unit("m")]
     """Distance; from the base."""
@@ -50,7 +50,7 @@ class Parts(TypedDict):
 
 @dataclass(frozen=True, kw_only=True)
 class First:
-    """What both have."""
+    """The common fields."""
 
     name: Literal["a", "b"]
     """Name."""

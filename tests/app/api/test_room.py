@@ -1,4 +1,4 @@
-"""The rooms of the endpoints: what routes and tasks get from each other."""
+"""The rooms of the endpoints: imports between routes and tasks."""
 
 from __future__ import annotations
 

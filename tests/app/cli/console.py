@@ -44,9 +44,7 @@ def run(*arguments: str, stdin: str = "", cwd: Path = ROOT) -> subprocess.Comple
 
 @dataclass
 class Here:
-    """The command in this process, which has everything imported; for runs that do not write an
-    answer.
-    """
+    """The command in this process with all imports done, for runs without an answer."""
 
     monkeypatch: pytest.MonkeyPatch
     capture: pytest.CaptureFixture[bytes]

@@ -95,7 +95,7 @@ def test_evaluate_takes_a_csv_with_options_and_settings(here: Here, tmp_path: Pa
     for more in ((), ("--settings", str(settings))):
         assert here.run(*given, *more) == (0, b"", b"")
         answer = model_of(EvaluateAnswer).model_validate_json(output.read_bytes())
-        # the option, not the file, says 1.5 s for each of two segments
+        # The option, not the file, sets 1.5 s for both segments.
         assert answer.duration == pytest.approx(3.0)
         energies.append(answer.total.energy.electrical.total)
     assert energies[1] > energies[0]
@@ -154,7 +154,7 @@ def test_robots_are_listed_with_their_trust() -> None:
     assert re.split(r"\s{2,}", head)[:4] == ["name", "title", "joints", "payload [kg]"]
     cells = re.split(r"\s{2,}", next(row for row in rows if row.startswith("ur5e ")))
     assert cells[1:4] == ["Universal Robots UR5e", "6", "5"]
-    # copper loss comes from a sister robot: no reader may miss that
+    # Copper loss comes from a sister robot, and the T tells every reader so.
     assert "T" in cells[6]
 
 
@@ -184,7 +184,9 @@ def test_every_help_has_an_example(here: Here, command: str) -> None:
 
 
 def test_serve_takes_host_and_port(here: Here, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the service reads as its settings. That it serves is shown with the installed wheel."""
+    """The options become the settings of the service; the test of the wheel starts a real
+    service.
+    """
     served: list[tuple[str, int]] = []
 
     def record() -> None:
@@ -192,7 +194,7 @@ def test_serve_takes_host_and_port(here: Here, monkeypatch: pytest.MonkeyPatch) 
         served.append((settings.host, settings.port))
 
     monkeypatch.setattr("joulepath.app.__main__.main", record)
-    # so that what the command sets is undone
+    # monkeypatch undoes the changes of the command
     monkeypatch.setenv("JOULEPATH_HOST", "203.0.113.7")
     monkeypatch.setenv("JOULEPATH_PORT", "1")
     assert here.run("serve")[0] == 0

@@ -1,4 +1,4 @@
-"""`joulepath export` and `joulepath report`: the files that the service gives, and its refusals."""
+"""`joulepath export` and `joulepath report`: the files of the service, and its refusals."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ def test_what_is_found_can_be_chosen(here: Here, logs: list[str], tmp_path: Path
     assert here.run("identify", logs[0], *chosen, "--payload", "0", "-o", str(output))[0] == 0
     result = RESULT.model_validate_json(output.read_bytes())
     found = {each.figure for each in result.parameters}
-    # the log has power, which is added by itself
+    # The log has power; the command adds it by itself.
     assert found == {
         "torque_constant",
         "coulomb",
@@ -120,7 +120,7 @@ def test_an_unknown_robot_is_named(here: Here, logs: list[str]) -> None:
 
 
 def test_options_say_what_a_file_does_not(here: Here, tmp_path: Path) -> None:
-    """A file without header, with currents in mA, of an arm that hangs."""
+    """Options describe a file without header, with currents in mA, of a hanging arm."""
     recording = recorded(ROBOT, truth_of(ROBOT), moves=6)
     file = tmp_path / "log.csv"
     table = np.column_stack([recording.time, recording.q, recording.v, 1e3 * recording.current])

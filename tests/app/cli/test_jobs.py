@@ -163,7 +163,7 @@ def test_whatever_is_kept_has_another_name(here: Here, client: TestClient, kind:
     assert taken_away == (2 if kept else 0)
     without = {"studies": "Lift, cell 4", "robots": id}.get(kind)
     assert client.get(path).json()[field] == without
-    # another test compares the service's robots with those that come with the library
+    # another test compares the service's robots with the robots of the library
     assert client.delete(path).status_code == 204
 
 

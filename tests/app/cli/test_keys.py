@@ -1,4 +1,4 @@
-"""`joulepath keys`: keys are shown once, and a service takes them until they are removed."""
+"""`joulepath keys`: keys are shown once, and a service accepts them until their removal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`joulepath robots add` and `remove`: what it added, a request may name."""
+"""`joulepath robots add` and `remove`: requests may name an added robot."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_what_makes_no_robot(here: Here, tmp_path: Path) -> None:
         problem["type"] == "/problems/robot-exists"
         and "neither replaced nor deleted" in problem["detail"]
     )
-    # only what was added can be removed
+    # only an added robot can be removed
     problem = here.problem("robots", "remove", "arm_2")[1]
     assert (problem["known"], problem["detail"]) == (
         [],

@@ -1,4 +1,4 @@
-"""Commands of searches: requests from options, answers in files, and what a terminal shows."""
+"""Commands of searches: requests from options, answers in files, and output on a terminal."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DOWN = "p[0.4,-0.2,0.3,2.221441,-2.221441,0]"
 
 
 def written(here: Here, tmp_path: Path, *arguments: str, stdin: str = "") -> Any:
-    """The JSON that a command writes to a file."""
+    """The JSON written to a file by a command."""
     output = tmp_path / "answer.json"
     assert here.run(*arguments, "--output", str(output), stdin=stdin) == (0, b"", b"")
     return json.loads(output.read_bytes())
@@ -86,7 +86,7 @@ def test_what_is_asked_for_must_be_whole(
 
 
 def test_a_front_with_its_motions(here: Here, tmp_path: Path) -> None:
-    """Each motion is a file that `export` takes."""
+    """`export` accepts the file of every motion."""
     folder = tmp_path / "new" / "motions"
     body = json.dumps(move(points=2, duration={"max": 2.0}))
     answer = written(here, tmp_path, "pareto", "-", "--answers", str(folder), stdin=body)

@@ -1,4 +1,4 @@
-"""Signals, broken pipes, and what a terminal shows."""
+"""Signals, broken pipes, and output on a terminal."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def wait_for_work(pid: int) -> None:
 
 
 def on_a_terminal(*arguments: str, stdin: str) -> tuple[int, str, str]:
-    """Exit code, standard output and what a terminal shows as standard error."""
+    """Exit code, standard output, and standard error as shown by a terminal."""
     terminal, other = pty.openpty()
     with TemporaryFile() as asked, TemporaryFile() as answer:
         asked.write(stdin.encode())

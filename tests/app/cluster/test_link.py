@@ -1,6 +1,4 @@
-"""A cluster in this process: results, errors, progress, cancelled work, machines and schedulers
-that go.
-"""
+"""A cluster in this process: results, errors, progress, cancellation, lost machines."""
 
 from __future__ import annotations
 
@@ -56,7 +54,7 @@ async def linked(address: str) -> AsyncIterator[Cluster]:
 
 @pytest.fixture
 async def scheduler(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Scheduler]:
-    """A scheduler with one machine of one worker, which is not warm for any robot."""
+    """A scheduler with one machine of one worker, warm for no robot."""
     monkeypatch.setenv("JOULEPATH_ROBOTS", "")
     async with (
         Scheduler(host="127.0.0.1", port=0, dashboard=False) as scheduler,
@@ -74,7 +72,7 @@ async def cluster(scheduler: Scheduler) -> AsyncIterator[Cluster]:
 
 
 def start(cluster: Cluster, task: Task) -> asyncio.Task[int]:
-    """A task whose result is the id of the process that computes it."""
+    """A task with the id of its process as the result."""
 
     async def process() -> int:
         return int((await result_of(cluster.run, task, LONG)).document)
@@ -107,7 +105,7 @@ async def test_results_errors_and_what_is_found_come_back(cluster: Cluster) -> N
 async def test_a_cancel_kills_what_runs_and_what_waits_never_begins(
     tmp_path: Path, cluster: Cluster
 ) -> None:
-    """Dask itself lets a task that runs go on to its end."""
+    """Dask itself lets a running task go on to its end."""
     process = await start(cluster, ProcessId())
     running = start(cluster, hold(tmp_path / "runs"))
     await until((tmp_path / "runs" / "started").exists)
@@ -188,8 +186,9 @@ def short(task: Task, ended: list[Ended]) -> Work:
 
 
 async def test_short_works_go_together(cluster: Cluster, scheduler: Scheduler) -> None:
-    """One that dies takes none of the others with it, and what each finds gets to those who listen
-    to it.
+    """Short works are one task of Dask; a work that dies leaves the others unharmed.
+
+    Progress of each work reaches its own listener.
     """
     ended, told = list[Ended](), list[Told]()
     works = [short(task, ended) for task in (ProcessId(), Count(3), Die(), ProcessId())]
@@ -209,7 +208,7 @@ async def test_short_works_go_together(cluster: Cluster, scheduler: Scheduler) -
 async def test_those_whose_machine_died_are_tried_one_by_one(
     tmp_path: Path, cluster: Cluster, scheduler: Scheduler
 ) -> None:
-    """One of them may be what machines die of."""
+    """One of the works may be the cause of the machine's death."""
     scheduler.allowed_failures = 0
     ended = list[Ended]()
     (first,) = cluster.workers
@@ -230,11 +229,12 @@ async def test_those_whose_machine_died_are_tried_one_by_one(
 def scheduler_process(
     folder: Path, **environment: str
 ) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
-    """A scheduler as a process of its own, with the package that is in a folder, or none; and its
-    address.
+    """A scheduler in its own process, and its address.
+
+    It imports the package from `folder`, or has none if the folder has none.
     """
     if not (folder / "joulepath").exists() and "PYTHONPATH" not in environment:
-        # the one that is installed is hidden
+        # hides the installed package
         (folder / "joulepath.py").write_text("raise ImportError('there is none')\n")
     port = free_port()
     command = [
@@ -259,8 +259,10 @@ def scheduler_process(
 
 
 async def refused_by(cluster: Cluster, caplog: pytest.LogCaptureFixture, reason: str) -> None:
-    """Until the log has the reason why nothing is sent to the cluster, which it says once. A busy
-    machine may need several attempts to reach the scheduler."""
+    """Waits for the log's reason why the cluster is refused, and checks its single occurrence.
+
+    A busy machine may need several attempts to reach the scheduler.
+    """
 
     def told() -> list[str]:
         records = [
@@ -298,7 +300,7 @@ def other_version(folder: Path) -> None:
 async def test_a_scheduler_without_this_version_gets_nothing(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, there: str, reason: str
 ) -> None:
-    """It reads what it passes on, and would fail every request."""
+    """A scheduler of another version cannot read the requests and would fail all of them."""
     if there == "another":
         other_version(tmp_path)
     with scheduler_process(tmp_path) as (_, address):

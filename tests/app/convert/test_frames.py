@@ -1,4 +1,4 @@
-"""Poses in ROS's `base_link`: the same problem as that of the same poses in `base`."""
+"""Poses in ROS's `base_link` give the same problem as the same poses in `base`."""
 
 from __future__ import annotations
 
@@ -35,8 +35,9 @@ def third_party() -> str:
 
 
 def in_ros(position: list[float]) -> dict[str, Any]:
-    """A pose in `base_link` whose TCP is at `position` of `base`, turned as QUATERNION says
-    there."""
+    """A pose in `base_link` with the TCP at `position` of `base`, turned by QUATERNION in
+    `base_link`.
+    """
     x, y, z = position
     turned = pin.Quaternion(np.array(QUATERNION)).matrix()
     back = pin.Quaternion(HALF_TURN[:3, :3] @ turned)
@@ -209,7 +210,7 @@ def test_obstacles_path_tool_cone_and_lines_follow_their_frames() -> None:
 
 
 def _bare(pose: dict[str, Any]) -> dict[str, Any]:
-    """Without its frame: an obstacle's is that of the scene."""
+    """The pose without its frame: an obstacle has the frame of the scene."""
     return {name: value for name, value in pose.items() if name != "frame"}
 
 

@@ -1,6 +1,4 @@
-"""Warnings in answers: of branches that may be missing, of a baseline that is left out, and of
-values in unlikely units.
-"""
+"""Warnings in answers: possibly missing branches, a missing baseline, values in unlikely units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Point clouds, voxels and mesh files from a request: what they become, and what is refused."""
+"""Point clouds, voxels and mesh files of a request: their conversion and their refusals."""
 
 from __future__ import annotations
 
@@ -73,7 +73,9 @@ def test_voxels_by_cells_and_by_bits_are_the_same() -> None:
 
 @pytest.mark.parametrize("format_", ["stl", "obj", "glb"])
 def test_a_mesh_file_keeps_every_triangle(format_: Any) -> None:
-    """Each of them, at the scale asked for, and closed as the mesh is."""
+    """All triangles of the file are kept, at the requested scale, and the result is closed as the
+    mesh.
+    """
     found = mesh_from_file(format_, base64_of(torus().export(file_type=format_)), 0.5)
     assert found.is_closed and found.corners.shape == (256, 3, 3)
     ours, theirs = in_order(found.corners * 2), in_order(torus().triangles)
@@ -104,7 +106,7 @@ def test_the_example_of_the_contract_is_a_tetrahedron() -> None:
 
 
 def glb(**fields: Any) -> bytes:
-    """A GLB whose JSON part has these fields, without any data."""
+    """A GLB with these fields in its JSON part, without any data."""
     text = json.dumps(
         {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}]} | fields
     ).encode()
@@ -198,8 +200,8 @@ def test_bad_obstacles_name_the_field(fields: dict[str, Any], field: str) -> Non
 
 
 def test_all_cells_of_the_greatest_grid_fit() -> None:
-    """One occupied cell, the last one: the text of the bits is within the length that the contract
-    allows.
+    """Only the last cell is occupied: the text of the bits fits the longest text of the
+    contract.
     """
     grid = np.zeros((256, 256, 128), dtype=bool)
     assert grid.size == MOST_CELLS

@@ -1,4 +1,4 @@
-"""An engine whose clock a test moves, and tasks that hold its workers."""
+"""An engine with a clock moved by the test, and tasks to hold its workers."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ import pytest
 from joulepath.app.engine.pool import Engine
 from tests.app.engine.simple_tasks import Hold, ProcessId
 
-# What a busy machine may take for anything below [s]; no test waits for it to pass.
+# The longest that a busy machine takes for any step below [s]; no test waits for it to pass.
 PATIENCE = 120.0
-# A deadline, and two graces, that a busy machine does not reach by itself [s]; the tests move the
-# clock beyond them.
+# A deadline, and two graces, out of reach of a busy machine [s]; tests move the clock past them.
 LONG = 1000.0
 DEADLINE_GRACE = 300.0
 SHUTDOWN_GRACE = 500.0
 
 
 class MovableLoop(asyncio.SelectorEventLoop):
-    """An event loop whose clock a test moves."""
+    """An event loop with a clock moved by the test."""
 
     moved = 0.0
 
@@ -32,7 +31,7 @@ class MovableLoop(asyncio.SelectorEventLoop):
 
 
 class Bench:
-    """An engine under test, and tasks that hold its workers until the test releases them."""
+    """An engine under test, with tasks that hold its workers until their release by the test."""
 
     def __init__(self, engine: Engine, loop: MovableLoop, folder: Path) -> None:
         self.engine, self._loop, self._folder = engine, loop, folder
@@ -42,7 +41,7 @@ class Bench:
         self._loop.moved += seconds
 
     async def held(self, deadline: float = LONG) -> tuple[asyncio.Task[Any], Path]:
-        """A task that runs in a worker; touch the path to let it end."""
+        """A task running in a worker; touch the path to let it end."""
         folder = self._folder / str(next(self._numbers))
         folder.mkdir()
         running = asyncio.create_task(self.engine.run(Hold(folder), deadline))
@@ -50,13 +49,13 @@ class Bench:
         return running, folder / "released"
 
     async def queued(self, task: Any, deadline: float = LONG) -> asyncio.Task[Any]:
-        """A task that waits for a worker."""
+        """A task waiting for a worker."""
         waiting = asyncio.create_task(self.engine.run(task, deadline))
         await asyncio.sleep(0)  # until it waits
         return waiting
 
     async def pid(self) -> int:
-        """Process id of the worker that runs the next task."""
+        """Process id of the worker of the next task."""
         return int((await self.engine.run(ProcessId(), LONG)).document)
 
 
@@ -67,6 +66,5 @@ async def until(condition: Callable[[], bool]) -> None:
 
 
 def settings(**given: Any) -> pytest.MarkDecorator:
-    """The settings of the engine of a test, and its function `warm`, where they are not those of
-    `bench`."""
+    """Settings of the engine, and its function `warm`, that differ from the defaults of `bench`."""
     return pytest.mark.parametrize("bench", [given], indirect=True, ids=[",".join(given)])

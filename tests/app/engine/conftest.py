@@ -1,4 +1,4 @@
-"""An engine for a test, on an event loop whose clock the test moves."""
+"""An engine for a test, on an event loop with a clock moved by the test."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ def anyio_backend() -> tuple[str, dict[str, Any]]:
 
 @pytest.fixture
 async def bench(request: pytest.FixtureRequest, tmp_path: Path) -> AsyncIterator[Bench]:
-    """An engine of one worker, with room for one request that waits; it is ready unless it cannot
-    warm up. `settings` changes it."""
+    """An engine of one worker, with room for one waiting request; `settings` changes it.
+
+    The engine is ready unless it cannot warm up.
+    """
     graces = {"deadline_grace": DEADLINE_GRACE, "shutdown_grace": SHUTDOWN_GRACE}
     given = {"workers": 1, "queue_size": 1, **graces, **getattr(request, "param", {})}
     warm = given.pop("warm", no_warm_up)

@@ -1,5 +1,4 @@
-"""Tasks for the engine that optimise nothing. In a module of their own, because workers import
-it."""
+"""Tasks for the engine without optimisation, in a module of their own because workers import it."""
 
 from __future__ import annotations
 
@@ -31,8 +30,9 @@ class ProcessId:
 
 @dataclass(frozen=True)
 class Hold:
-    """Keeps its worker busy, whatever the deadline, until the file `released` is in the folder;
-    then its process id.
+    """Keeps its worker busy past any deadline until the folder has the file `released`.
+
+    The result is the process id.
     """
 
     folder: Path
@@ -62,7 +62,7 @@ class HoldWatching:
 
 @dataclass(frozen=True)
 class EndEarly:
-    """Returns what it has as soon as it is stopped, and never looks at a checkpoint."""
+    """Returns its result as soon as it is stopped, without a look at a checkpoint."""
 
     folder: Path
     request_id: str = "end-early"
@@ -101,8 +101,9 @@ class TimeLeft:
 
 @dataclass(frozen=True)
 class Die:
-    """Ends its worker as a crash in native code does; it notes that in the folder, if there is
-    one."""
+    """Ends its worker like a crash in native code, and leaves a note in the folder, if there is
+    one.
+    """
 
     folder: Path | None = None
     request_id: str = "die"
@@ -133,7 +134,7 @@ class Count:
 
     @property
     def told(self) -> list[Told]:
-        """What it tells."""
+        """The progress told by the task."""
         numbers = range(self.total)
         return [
             StepsDone(number, self.total, "numbers") if number % 2 else CandidatesFound(number)

@@ -1,4 +1,4 @@
-"""The version of the code: it tells apart all that answers depend on, and nothing else."""
+"""The version of the code changes with everything that answers depend on, and nothing else."""
 
 from __future__ import annotations
 

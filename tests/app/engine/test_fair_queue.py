@@ -1,5 +1,4 @@
-"""Clients take turns, have their share, and give back what others need. The tests move the
-clock."""
+"""Clients take turns, have their share, and give back workers. The tests move the clock."""
 
 from __future__ import annotations
 
@@ -16,7 +15,7 @@ from tests.app.engine.simple_tasks import Hold, ProcessId
 
 
 async def held(bench: Bench, folder: Path, client: str) -> tuple[asyncio.Task[Any], Path]:
-    """A task of a client that runs in a worker; touch the path to let it end."""
+    """A client's task running in a worker; touch the path to let it end."""
     folder.mkdir()
     running = asyncio.create_task(bench.engine.run(Hold(folder), LONG, client))
     await until((folder / "started").exists)
@@ -24,7 +23,7 @@ async def held(bench: Bench, folder: Path, client: str) -> tuple[asyncio.Task[An
 
 
 async def waiting(bench: Bench, client: str, name: str, ended: list[str]) -> asyncio.Task[Any]:
-    """A task of a client that waits for a worker; at its end its name comes into the list."""
+    """A client's waiting task; at its end, it adds its name to the list."""
 
     async def run() -> None:
         await bench.engine.run(ProcessId(), LONG, client)
@@ -89,7 +88,7 @@ async def test_a_client_with_several_workers_gives_one_back(tmp_path: Path, benc
     (tmp_path / "second" / "started").unlink()
     bench.move_clock(PATIENCE)
     await newcomer
-    # the last to have begun begins again, beside the first, since nobody else waits
+    # The task begun last begins again beside the first, since no other one waits.
     await until((tmp_path / "second" / "started").exists)
     assert not first.done()
     release_first.touch()

@@ -1,8 +1,6 @@
-"""The queue in any order of events: it loses no worker, keeps nobody waiting beside an idle one,
-and confuses nobody.
+"""The queue under any order of events loses no worker and lets no request wait beside an idle one.
 
-Events come in the same turn of the event loop or in different ones. No time passes but what a step
-lets pass.
+Events come in the same turn of the event loop or in different turns. Only a step moves the clock.
 """
 
 from __future__ import annotations
@@ -31,14 +29,14 @@ CAPACITY = 8
 SHARE = 5
 CLIENTS = st.sampled_from("abc")
 WORKERS = 3
-# a request that nobody waits for needs a turn to leave, one to give its worker back, and one to get
-# the next
+# An abandoned request needs three turns: to leave, to give its worker back, and for the next
+# request to get the worker.
 SETTLING_TURNS = 20
 STEPS_OF_ONE_RUN = 100
 
 
 class StubWorker:
-    """A worker. A task in it ends when the test says so, and so does one that is told to stop."""
+    """A worker whose task ends at the test's command, or at once when told to stop."""
 
     def __init__(self) -> None:
         self.alive = True
@@ -112,7 +110,7 @@ class Request:
 
 
 class SpareWork:
-    """Work that can wait, on a worker that no request waits for."""
+    """Work that can wait, on a worker needed by no request."""
 
     def __init__(self, queue: FairQueue) -> None:
         self.worker: StubWorker | None = None
@@ -130,7 +128,7 @@ class SpareWork:
 
 
 class StillLoop(asyncio.SelectorEventLoop):
-    """An event loop in which no time passes but what a step lets pass."""
+    """An event loop with a clock moved by the steps alone."""
 
     now = 0.0
 
@@ -163,7 +161,7 @@ class QueueMachine(RuleBasedStateMachine):
         self.noticed.append(context)
 
     def _within(self, call: Callable[[], Any]) -> Any:
-        """The result of a call within the loop, which begins no other turn."""
+        """The result of a call within the loop, without another turn of the loop."""
 
         async def within() -> Any:
             return call()
@@ -255,7 +253,7 @@ class QueueMachine(RuleBasedStateMachine):
         self._has_settled()
 
     def _has_settled(self) -> None:
-        """What must hold when nothing is under way."""
+        """Invariants of the queue at rest."""
         alive = [worker for worker in self.workers if worker.alive]
         idle = [worker for worker in alive if worker.is_free]
         assert {worker for worker, loan in self.queue._loans.items() if worker.alive} == set(alive)

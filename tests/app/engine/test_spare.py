@@ -1,5 +1,5 @@
-"""Work that can wait: it comes after callers, and gives its worker to one that waits. The tests
-move the clock.
+"""Spare work comes after callers and gives its worker to a waiting one. The tests move
+the clock.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tests.app.engine.simple_tasks import Die, Fail, Hold, ProcessId
 
 
 async def spare(bench: Bench, folder: Path, **options: Any) -> tuple[asyncio.Task[Any], Path]:
-    """Work that can wait and runs in a worker; touch the path to let it end."""
+    """Spare work running in a worker; touch the path to let it end."""
     folder.mkdir()
     running = asyncio.create_task(result_of(bench.engine.spare.run, Hold(folder), LONG, **options))
     await until((folder / "started").exists)
@@ -99,8 +99,8 @@ async def test_its_deadline_counts_from_its_start(tmp_path: Path, bench: Bench) 
 
 @pytest.mark.parametrize("is_short", [False, True])
 async def test_one_after_another_on_one_worker(is_short: bool, bench: Bench) -> None:
-    """Errors of tasks end nothing but themselves; what kills the worker leaves the rest. Short ones
-    are sent ahead.
+    """A task's error ends only this task; a worker's death leaves the rest. Short tasks
+    go ahead.
     """
     ended: list[Ended] = []
     tasks = [

@@ -1,6 +1,4 @@
-"""Tasks that nobody wants any more end by themselves; their workers stay warm, and answer nobody
-else's question.
-"""
+"""Abandoned tasks end by themselves; their workers stay warm and answer only their own request."""
 
 from __future__ import annotations
 
@@ -29,14 +27,14 @@ from tests.app.engine.bench import (
 )
 from tests.app.engine.simple_tasks import Die, DieOnce, EndEarly, Hold, HoldWatching, ProcessId
 
-# no busy machine is so late that a worker that looks is killed [s]
+# No busy machine delays a cooperating worker until it is killed [s].
 NEVER_KILLED = 200.0
 
 
 async def begun(
     bench: Bench, task: Any, deadline: float = LONG, client: str = ""
 ) -> asyncio.Task[Any]:
-    """A task with a folder, which runs in a worker."""
+    """A task with a folder, running in a worker."""
     task.folder.mkdir()
     running = asyncio.create_task(bench.engine.run(task, deadline, client))
     await until((task.folder / "started").exists)
@@ -173,7 +171,7 @@ async def test_a_service_is_not_ready_while_requests_wait_and_none_runs(bench: B
     running, release = await bench.held()
     waiting = await bench.queued(ProcessId())
     assert bench.engine.ready, "one is at work"
-    # as a defect would leave it: the worker is alive, and nobody has it
+    # Simulates a defect: the worker is alive, but no request holds it.
     (worker,) = bench.engine._workers
     del bench.engine.queue._loans[worker]
     assert not bench.engine.ready
@@ -220,8 +218,7 @@ async def test_shutdown_in_the_turn_of_a_deadline(tmp_path: Path, turns: int, be
 
 @settings(workers=2, queue_size=200, client_requests=100)
 async def test_workers_killed_at_random_beside_everything(tmp_path: Path, bench: Bench) -> None:
-    """Requests that end, leave and time out, jobs beside them, and a worker killed again and
-    again."""
+    """Requests end, leave and time out beside jobs, while workers are killed at random."""
     rng = random.Random(1)
     engine = bench.engine
 

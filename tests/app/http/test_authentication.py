@@ -1,6 +1,4 @@
-"""API keys over a real socket: who gets in, who may do what, whose things are whose, and what the
-log says.
-"""
+"""API keys over a real socket: access, rights of roles, owners of stored things, and the log."""
 
 from __future__ import annotations
 
@@ -34,7 +32,7 @@ STEP = {"evaluate": {"configurations": [[0.0] * 6, [0.1] * 6], "time_per_segment
 
 @dataclass(frozen=True)
 class Guarded:
-    """A service that needs keys, one client of each role, and another that computes."""
+    """A service with keys, one client of each role, and a second computing client."""
 
     server: Server
     file: Path
@@ -138,7 +136,7 @@ def test_no_spelling_of_a_path_gets_around(guarded: Guarded, path: str) -> None:
         connection.sendall(
             f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode()
         )
-        # a path that is public but unknown is answered as such; no other one is answered at all
+        # An unknown path that is public has a response of its own; all other paths are refused.
         assert connection.recv(1000).split()[1] in (b"401", b"404", b"400")
 
 

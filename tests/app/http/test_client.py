@@ -1,6 +1,4 @@
-"""The client's address: behind trusted proxies, what they report, and never what a client says of
-itself.
-"""
+"""The client's address: as reported by trusted proxies, never as stated by the client."""
 
 from __future__ import annotations
 

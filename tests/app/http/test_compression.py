@@ -211,7 +211,7 @@ def test_other_codings_are_told_so(server: Server, coding: str) -> None:
 
 WHOLE = gzip.compress(json.dumps(POSE).encode(), mtime=0)
 WHOLE_ZSTD = zstandard.ZstdCompressor(write_checksum=True).compress(json.dumps(POSE).encode())
-# a frame that asks for a window of 128 MiB
+# a frame with a window of 128 MiB
 LARGE_WINDOW = b"\x28\xb5\x2f\xfd\x00\x88" + b"\x01\x00\x00"
 
 
@@ -247,7 +247,7 @@ PACKS: dict[str, Any] = {"gzip": gzip.compress, "zstd": zstandard.compress}
 @pytest.mark.parametrize("coding", PACKS)
 @pytest.mark.parametrize("path", ["/ik", "/evaluate", "/whatif"])
 def test_a_bomb_is_refused(server: Server, path: str, coding: str) -> None:
-    # a hundred kilobytes at most that unpack to more than any path takes
+    # at most a hundred kilobytes, unpacked to more than the limit of any path
     bomb = PACKS[coding](b" " * 80_000_000)
     answer, content = sent(server, path, bomb, Content_Encoding=coding)
     assert answer.status == 413

@@ -1,6 +1,4 @@
-"""Ceilings of connections over a real socket: heads, bodies, answers that nobody reads, and how
-many there may be.
-"""
+"""Ceilings of connections over a real socket: heads, bodies, unread answers, and their number."""
 
 from __future__ import annotations
 
@@ -56,7 +54,7 @@ def strict() -> Iterator[Server]:
 
 @pytest.fixture(autouse=True)
 def _nobody_is_connected(strict: Server) -> None:
-    """Those of the test before are gone: as many as may be can connect."""
+    """The connections of the test before are gone, so the largest number of clients can connect."""
 
     def all_fit() -> bool:
         with ExitStack() as stack:
@@ -132,7 +130,7 @@ def test_half_a_body_is_not_waited_for(strict: Server, path: str) -> None:
 
 
 def test_a_client_that_has_left_is_not_timed(strict: Server) -> None:
-    """Its request ends later than its connection, which has nothing left that could be reset."""
+    """Its request ends later than its connection, so a timeout would reset nothing."""
     for _ in range(MOST_OF_CLIENT):
         with connected(strict) as leaving:
             leaving.sendall(post("/evaluate", b"{", declared=1000))
@@ -237,7 +235,7 @@ def test_one_client_has_its_share_of_connections(strict: Server) -> None:
 
 
 def test_sigterm_waits_for_no_client() -> None:
-    # the grace is longer than the test waits: what is open has to be ended before
+    # The grace exceeds the wait of the test, so the service has to end open connections before it.
     with (
         serving(recorded=True, shutdown_grace=10 * EXIT, write_timeout=SHORT) as server,
         connected(server) as half_a_head,

@@ -1,6 +1,4 @@
-"""Progress of one request over a real socket: events, then the answer or the problem, and clients
-that leave.
-"""
+"""Progress of one request over a real socket: events, the answer or the problem, lost clients."""
 
 from __future__ import annotations
 
@@ -40,7 +38,7 @@ def one() -> Iterator[Server]:
 
 
 def parsed(text: str) -> Iterator[Event]:
-    """The events of a stream, whose comments mean nothing."""
+    """The events of a stream, without comments."""
     for block in text.split("\n\n")[:-1]:
         if not block.startswith(":"):
             name, data = block.split("\n")

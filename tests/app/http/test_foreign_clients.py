@@ -1,5 +1,5 @@
-"""Clients that speak HTTP in ways of their own: without names or media types, with offers of other
-protocols, for the head alone.
+"""Unusual clients of HTTP: without names or media types, with other protocols, for the
+head alone.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def test_a_head_is_that_of_the_whole_answer(server: Server, path: str) -> None:
 
 
 def test_the_head_of_a_stream_ends(server: Server) -> None:
-    """Nobody waits for what would follow it: the job has not ended."""
+    """The head ends although the job has not ended: no client waits for its body."""
     job = server.post(
         "/jobs", {"requests": [{"optimize": {"start": {"q": [0.0] * 6}, "goal": {"q": [0.1] * 6}}}]}
     )

@@ -1,4 +1,4 @@
-"""GET /metrics: true numbers, and no label that a client can multiply."""
+"""GET /metrics: true numbers, and no label under the control of a client."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The OpenAPI document: complete, true to what is sent, and its examples valid."""
+"""The OpenAPI document: complete, true to requests and responses, with valid examples."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def properties(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]
 
 
 def named(node: Any, document: dict[str, Any]) -> set[str]:
-    """Names of all schemas that a part of the document is made of."""
+    """Names of all schemas within a part of the document."""
     found, open_ = set[str](), [node]
     while open_:
         part = open_.pop()
@@ -58,7 +58,7 @@ def test_every_field_is_described(document: dict[str, Any]) -> None:
 
 
 def test_every_plain_field_has_an_example(document: dict[str, Any]) -> None:
-    # the example of a problem is a whole document, with the parts that it refers to
+    # The example of a problem is a whole document, with all parts it refers to.
     whole = {
         name for name, schema in document["components"]["schemas"].items() if "examples" in schema
     }
@@ -88,7 +88,7 @@ def test_every_number_has_its_unit(document: dict[str, Any]) -> None:
 
 def test_examples_are_valid(document: dict[str, Any]) -> None:
     components = {"components": document["components"]}
-    # one schema of all fields: compiling one for each takes minutes
+    # One schema of all fields: a schema for every field would take minutes to compile.
     fields = dict(properties(document))
     validator = jsonschema_rs.validator_for({"type": "object", "properties": fields} | components)
     for name, schema in fields.items():
@@ -160,7 +160,7 @@ def test_version_is_the_projects(document: dict[str, Any]) -> None:
 
 @pytest.fixture(scope="module")
 def short(client: TestClient) -> dict[str, Any]:
-    """The document that the page `/docs` opens."""
+    """The document of the page `/docs`."""
     return client.get("/docs/openapi.json").json()
 
 
@@ -200,7 +200,7 @@ def test_the_short_document_has_every_operation_and_field(
 def test_long_requests_have_their_fields_in_groups(
     document: dict[str, Any], short: dict[str, Any]
 ) -> None:
-    """All that a person writes and that has more fields than a screen has lines."""
+    """Every schema written by a person with more fields than fit on a screen has groups."""
     schemas = document["components"]["schemas"]
     grouped = {name for name, own in schemas.items() if "x-group" in str(own)}
     asked = {
@@ -255,8 +255,8 @@ def test_the_document_has_no_words_that_generators_of_clients_refuse(
     document: dict[str, Any],
 ) -> None:
     # openapi-generator refuses a document of 3.1 with words of 3.2; openapi-python-client leaves
-    # out all endpoints whose requests have objects as defaults, and cannot read alternatives with
-    # `const`
+    # out all endpoints with objects as defaults in their requests, and cannot read alternatives
+    # with `const`.
     refused = list[str]()
 
     def collect(node: Any, path: str) -> None:

@@ -1,6 +1,4 @@
-"""Attacks by web pages: a name that leads here, forms and plain text that need no preflight, and
-preflights.
-"""
+"""Attacks by web pages: a name with this address, requests without preflight, and preflights."""
 
 from __future__ import annotations
 
@@ -25,7 +23,7 @@ PAGE = "https://cell4.example"
 
 @pytest.fixture(scope="module")
 def service() -> Iterator[Server]:
-    """Open, with one name and one page that are allowed."""
+    """A service without keys, with one allowed host name and one allowed page."""
     with serving(
         recorded=True, allowed_hosts="robots.example", cors_origins=PAGE, host="127.0.0.1"
     ) as server:

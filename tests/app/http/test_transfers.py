@@ -1,6 +1,4 @@
-"""Bytes in flight over a real socket: bodies and answers for which there is no room, and clients
-that leave.
-"""
+"""Bytes in flight over a real socket: bodies and answers without room, and clients that leave."""
 
 from __future__ import annotations
 
@@ -24,16 +22,14 @@ THIRD = "127.0.0.3"
 
 @pytest.fixture(scope="module")
 def tight() -> Iterator[Server]:
-    """A server with room for three large bodies, two of them of one client."""
+    """A server with room for three large bodies, two of them from one client."""
     room = {"max_bytes_in_flight": 3 * BODY + 100_000, "client_bytes_in_flight": 2 * BODY + 100_000}
     with serving(recorded=True, **room) as server:
         yield server
 
 
 def begun(server: Server, stack: ExitStack, path: str, address: str) -> None:
-    """A body of which the service has received the first byte; it keeps its place until the stack
-    ends.
-    """
+    """A body whose first byte has reached the service; it keeps its place until the stack ends."""
     count = len(received(server, path))
     stack.enter_context(connected(server, address)).sendall(post(path, b"{", declared=BODY))
     until(lambda: len(received(server, path)) > count)
@@ -48,7 +44,7 @@ def received(server: Server, path: str) -> list[dict[str, Any]]:
 
 
 def left(server: Server, path: str) -> list[dict[str, Any]]:
-    """Lines of the log about requests whose clients left."""
+    """Lines of the log about requests with departed clients."""
     return [
         entry for entry in server.logged() if entry.get("status") == 499 and entry["path"] == path
     ]
@@ -71,7 +67,7 @@ def test_bodies_count_against_a_share_and_a_total(tight: Server, path: str) -> N
         assert int(refused.headers["retry-after"]) > 0
         begun(tight, stack, path, OTHER)
         checked(Busy, asked(tight, THIRD, post(path, b"{", declared=BODY)).problem)
-        # small ones still fit
+        # small bodies still fit
         assert asked(tight, THIRD, post("/optimize", b"{}")).status == 422
         assert (
             asked(tight, THIRD, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").status == 200

@@ -1,5 +1,7 @@
-"""The dispatcher: two of them on one database, workers that die, a database that fails, a stop. The
-tests run the work and move the clock of the leases."""
+"""The dispatcher: two on one database, dying workers, a failing database, a stop.
+
+The tests run the work and move the clock of the leases.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,7 @@ def answer(name: str) -> TaskResult:
 
 
 class Work:
-    """An executor whose work the test ends."""
+    """An executor with work that the test ends."""
 
     def __init__(self, name: str) -> None:
         self.name, self.slots, self.free = name, 1, asyncio.Event()
@@ -115,7 +117,7 @@ async def test_a_second_service_takes_over_and_the_late_answer_is_dropped(store:
     await until(lambda: first.work.begun == [0])
     second.dispatcher.start()
     second.work.free.set()
-    # the first stands still, so that it renews nothing
+    # The first dispatcher stands still, so it renews no lease.
     second.moved = LEASE + timedelta(seconds=5)
     await until(lambda: is_done(second, job_id))
     # it has lost the lease, and sees it by itself

@@ -105,7 +105,7 @@ async def test_one_is_computed_and_the_others_get_its_answer(
 
 
 async def test_a_service_without_workers_takes_nothing(store: Store, service: Service) -> None:
-    """As one whose cluster is lost just after a request with a known answer."""
+    """A known answer does not occupy a request of a service whose cluster is lost."""
     service.work.free.set()
     service.dispatcher.start()
     await done(service, asks())
@@ -126,7 +126,9 @@ async def test_more_time_may_find_a_better_answer(service: Service) -> None:
 
 
 async def test_answers_that_refer_to_others_stay_in_their_job(service: Service) -> None:
-    """Those that they refer to are deleted with it."""
+    """Answers of a cycle's moves are deleted with their job, so another job must not
+    refer to them.
+    """
     service.work.free.set()
     service.dispatcher.start()
     await done(service, asks(kind="cycle"), asks(kind="cycle"))

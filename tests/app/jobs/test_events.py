@@ -1,4 +1,4 @@
-"""Many readers of one job's events: they share what is read for them, and each gets all of it."""
+"""Many readers of one job's events share reads of the store, and all get every event."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from tests.app.jobs.test_dispatcher import Service, is_done, sent, until
 
 T = TypeVar("T")
 READERS = 300
-# one for each time that something happens, and for the ends of readers that were late
+# one read for every change of the job, and for the ends of late readers
 MOST_READS = 40
 
 
 class CountedStore:
-    """Counts what is read."""
+    """A store with a count of its reads."""
 
     def __init__(self, store: Store) -> None:
         self.store, self.reads = store, 0
@@ -81,7 +81,7 @@ async def test_a_quiet_stream_has_comments(
 
 
 async def test_what_happens_during_a_read_begins_another() -> None:
-    """A read that began before an event does not have it."""
+    """A read begun before an event lacks the event, so a later caller needs another read."""
     changes, begun, free = Changes(), list[int](), asyncio.Event()
 
     async def read() -> int:

@@ -1,4 +1,4 @@
-"""The dispatcher and its executor: progress within requests, and slots that come and go."""
+"""The dispatcher and its executor: progress within requests, and a changing number of slots."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ async def test_time_left_of_an_identification(store: Store, service: Service) ->
 
 
 async def test_jobs_wait_until_there_is_a_slot(store: Store, service: Service) -> None:
-    """As for a cluster that cannot be reached, and for machines that come and go."""
+    """An unreachable cluster has no slots, and machines come and go."""
     service.work.slots = 0
     job_id = await sent(service, 3)
     service.dispatcher.start()

@@ -1,4 +1,6 @@
-"""POST /advice: each change is what the changed task needs, and nothing else is claimed."""
+"""POST /advice: the energy of a change is the energy of the changed task, and no more is
+claimed.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,7 @@ def test_a_move_is_advised_to_take_the_whole_time_and_to_brake(client: TestClien
     assert found["home"] is None
     total = alone["energy"]["electrical"]["total"]
     assert found["energy"] - found["waiting"] == pytest.approx(total, rel=CLOSE)
-    # the wait of the same motion, which /optimize counts
+    # the wait of the same motion, as counted by /optimize
     ends = {key: {"q": alone["branch"][key]["q"]} for key in ("start", "goal")}
     held = client.post(
         "/optimize",

@@ -1,5 +1,5 @@
-"""Answers of a sensible size: the candidates that are asked for, and every answer of /optimize
-again by its path.
+"""Answers of a sensible size: the requested candidates, and every answer of /optimize by
+its path.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def test_every_answer_is_kept(recorded: TestClient) -> None:
 
 
 def test_an_answer_has_its_request_as_it_was_sent(recorded: TestClient) -> None:
-    """Those of jobs and studies, too, but no part of another answer."""
+    """Answers of jobs and studies have their request, too, but no part of another answer."""
     one = {**move(), "payload": None, "deadline": 9.0}
     (of_job,) = ended(recorded, sent(recorded, [{"optimize": one, "name": "bin to shelf"}]))[
         "requests"
@@ -92,7 +92,7 @@ def test_an_answer_has_its_request_as_it_was_sent(recorded: TestClient) -> None:
 
 
 def test_the_answers_are_listed(recorded: TestClient) -> None:
-    """Newest first, page by page, each with the figures of its motion; those of studies and jobs,
+    """The list is newest first, in pages, with the figures of the motions, of studies and jobs,
     too.
     """
     own = recorded.post("/optimize", json=move()).json()
@@ -139,7 +139,7 @@ def test_the_answers_are_listed(recorded: TestClient) -> None:
 
 
 def test_answers_have_names_and_are_found(recorded: TestClient) -> None:
-    """Without the motions of cycles, and the answers of jobs and studies, where it is asked for."""
+    """On request, the list leaves out motions of cycles and answers of jobs and studies."""
     tray = f"50% tray {uuid4().hex[:6]}"
     own = recorded.post("/optimize", json=move()).json()["id"]
     path = sent(recorded, [optimization(1.5)])

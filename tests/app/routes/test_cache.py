@@ -1,6 +1,4 @@
-"""Answers that were computed before: found by the canonical form of a request, by nobody else, and
-not for ever.
-"""
+"""Cached answers: found by the canonical form of a request, by its owner alone, and for a while."""
 
 from __future__ import annotations
 
@@ -244,7 +242,7 @@ async def test_an_equal_request_that_ends_after_a_look_at_the_store_is_not_misse
     looked, goes_on = asyncio.Event(), asyncio.Event()
 
     class Late(AnswerCache):
-        """Goes on from its look at the store, which finds nothing, only when it is told to."""
+        """Waits for the test after a look at the store in vain."""
 
         async def _find(self, asked: Asked | None) -> TaskResult | None:
             known = await super()._find(asked)

@@ -1,6 +1,4 @@
-"""Obstacles, tool and cone over HTTP: what is avoided, what is refused, and what the certificate
-says of it.
-"""
+"""Obstacles, tool and cone over HTTP: avoided, refused, and reported in the certificate."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""`POST /compare`: the table against single requests, its order, its problems, and what it
-refuses."""
+"""`POST /compare`: the table against single requests, its order, its problems, and its refusals."""
 
 from __future__ import annotations
 
@@ -21,9 +20,9 @@ MOVE = {
     "goal": {"q": [1.2, -1.1, 1.9, -2.2, -1.3, 0.4]},
     **PATIENT,
 }
-# two runs of a method do the same, but for where a deadline cuts
+# Two runs of a method agree, apart from the cut of a deadline.
 SAME = 1e-9
-# beyond the default, for a machine that is busy [s]
+# beyond the default, for a busy machine [s]
 PATIENCE = 100.0
 
 

@@ -1,6 +1,4 @@
-"""POST /cycle: the cycle as the contract lays it out, its answers by reference, and what is
-refused.
-"""
+"""POST /cycle: the layout of the contract, answers by reference, and refusals."""
 
 from __future__ import annotations
 
@@ -21,7 +19,7 @@ from tests.app.requests import HOME, PATIENT
 
 # relative: sums of the same numbers in another order
 ROUNDING = 1e-9
-# relative: optima of the same moves, from initial guesses that round differently
+# relative: optima of the same moves from initial guesses with different rounding
 SAME_MOTION = 1e-6
 REST: dict[str, Any] = {"target": {"q": HOME}}
 PART = {"mass": 2.0, "com": [0.0, 0.0, 0.1]}
@@ -41,7 +39,7 @@ def a_cycle(**fields: Any) -> dict[str, Any]:
 
 
 def answered(client: TestClient, asked: dict[str, Any]) -> dict[str, Any]:
-    """The answer to a cycle, which keeps to its schema."""
+    """The answer to a cycle, checked against its schema."""
     reply = client.post("/cycle", json=asked)
     assert reply.status_code == 200, reply.text
     model_of(CycleAnswer).model_validate_json(reply.content)
@@ -270,7 +268,7 @@ def test_a_redundant_arm_warns_once_of_what_holds_for_the_whole_cycle(client: Te
 
 
 def test_the_moves_repeat_the_scene_in_its_frame(client: TestClient) -> None:
-    """What computes with a move's arm meets the obstacles where the cycle did."""
+    """A computation with a move's arm meets the obstacles at the same places as the cycle."""
     pose = {"position": [0.5, 0.0, 0.1], "quaternion": [0.0, 0.0, 0.0, 1.0]}
     scene = {
         "frame": "base_link",

@@ -17,7 +17,7 @@ from tests.app.routes.test_cycle import PART, ROUNDING, a_cycle, answered, down
 
 
 def passing_cycle(**fields: Any) -> dict[str, Any]:
-    """A part is carried past a scanner, in two configurations of each stop."""
+    """A part is carried past a scanner, in two configurations at every stop."""
     stops: list[dict[str, Any]] = [
         {"name": "pick", "target": down(0.45, -0.3, 0.15), "dwell": 0.3, "payload": PART},
         {"name": "scanner", "target": down(0.45, 0.05, 0.35), "via": True},

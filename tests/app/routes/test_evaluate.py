@@ -30,7 +30,7 @@ SAME = 1e-9
 
 
 def through(*rows: Any, **fields: Any) -> dict[str, Any]:
-    """A motion through configurations, a second for each segment, and whatever else is given."""
+    """A motion through configurations, a second for each segment, with further fields."""
     return {"configurations": list(rows), "time_per_segment": 1.0, **fields}
 
 
@@ -49,7 +49,7 @@ def upload(client: TestClient, content: str | bytes, accept: str = "*/*", **quer
 
 
 def refused(answer: Any, kind: type[DeclaredError]) -> dict[str, Any]:
-    """The content of an answer that must be a problem of that kind."""
+    """The content of an answer, checked to be a problem of the given kind."""
     content: dict[str, Any] = answer.json()
     assert content["type"] == path_of(kind), content
     checked(kind, answer.content)

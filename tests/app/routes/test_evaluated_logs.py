@@ -1,6 +1,4 @@
-"""Logs in `POST /evaluate`: every file that `POST /logs` reads, stored logs, and what was measured
-in each move.
-"""
+"""Logs in `POST /evaluate`: every format of `POST /logs`, stored logs, and measured energies."""
 
 from __future__ import annotations
 
@@ -29,10 +27,9 @@ CARRIED = Payload(1.5, np.array([0.0, 0.02, 0.06]))
 TRUTH = truth_of(ROBOT, payload=CARRIED)
 CSV = {"Content-Type": "text/csv"}
 PAYLOAD = {"mass": CARRIED.mass, "com": CARRIED.com.tolist()}
-# relative: integrals over rows 8 ms apart, once of the log and once of the reader's grid, which it
-# low-passes
+# relative: integrals over rows 8 ms apart, of the log and of the reader's low-pass filtered grid
 SAMPLED = 2e-3
-# relative: of the unit's drives against the robot's own figures, which differ by some ten per cent
+# relative: drives of the unit against the robot's own figures, which differ by some ten per cent
 OWN_FIGURES = 0.25
 # s: a move begins and ends slowly, and counts once its speed is above the noise
 EDGES = 0.15
@@ -127,7 +124,7 @@ def test_the_measured_energy_of_each_move_stands_beside_the_models(
 def test_the_efforts_of_the_robots_own_figures_make_the_models_energy(
     client: TestClient, recording: Recording
 ) -> None:
-    """Torques that the model itself needs: what the motors are measured to take is what it says."""
+    """The measured energy of the model's own torques equals the energy of the model."""
     model = evaluated(
         client,
         csv_of(recording, without="aiP"),
@@ -158,7 +155,7 @@ def test_the_efforts_of_the_robots_own_figures_make_the_models_energy(
 def test_whatever_is_a_log_is_a_motion(
     client: TestClient, recording: Recording, write: Any
 ) -> None:
-    """The same motion, whatever the columns: within what their digits and derivatives leave."""
+    """All formats give the same motion, to within their digits and derivatives."""
     plain = csv_of(recording, without="iP")
     expected = evaluated(client, plain, payload=json.dumps(PAYLOAD))["total"]["energy"][
         "electrical"
@@ -234,8 +231,7 @@ def test_an_absent_log_is_unknown(client: TestClient, id: str) -> None:
 
 
 def test_efforts_that_say_nothing_do_not_stop_it(client: TestClient, recording: Recording) -> None:
-    """To identify anything from them would be wrong; the energy of the motion does not need
-    them."""
+    """Nothing can be identified from such efforts; the energy of the motion does not need them."""
     body = table(
         ["t", *(f"q{j}" for j in range(1, 7)), *(f"i{j}" for j in range(1, 7))],
         np.column_stack([recording.time, recording.q, np.ones_like(recording.q)]),

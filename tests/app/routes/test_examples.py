@@ -1,4 +1,4 @@
-"""The files in `examples`: each is answered by the endpoint that its folder is named after."""
+"""The files in `examples` are answered by the endpoints that name their folders."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ IN_THE_DOCUMENT = {
     for name, example in by_media_type.get(JSON, {}).items()
 }
 
-# those of the OpenAPI document are sent by its own test
+# the test of the OpenAPI document sends these examples
 SENT = FILES.keys() - IN_THE_DOCUMENT.keys()
 # answered in seconds
 SLOW = {
@@ -59,14 +59,12 @@ def test_file_is_answered(name: str, client: TestClient) -> None:
 
 
 def test_a_slow_example_names_its_own_deadline() -> None:
-    """What a user sends as it is must be answered within the default deadline, or else bring a
-    longer one.
-    """
+    """An example is answered within the default deadline, or brings a longer deadline."""
     assert all("deadline" in json.loads(FILES[name].read_text()) for name in SLOW)
 
 
 def test_the_job_example_runs_to_its_end(client: TestClient) -> None:
-    """One of its requests shows what becomes of a motion that is asked to be too short."""
+    """One of the requests of the job shows the problem of a motion with too short a duration."""
     asked = json.loads(FILES["jobs/moves"].read_text())
     job = ended(client, sent(client, asked.pop("requests"), **asked))
     assert job["state"] == "done"

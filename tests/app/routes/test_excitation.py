@@ -1,6 +1,4 @@
-"""POST /excitation: a certified motion that the other endpoints take, and problems that say what is
-in the way.
-"""
+"""POST /excitation: a certified motion for the other endpoints, and problems with their cause."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""POST /export/{format} of every kind of answer, and what is refused: altered answers, wrong
-robots, wrong bodies.
-"""
+"""POST /export/{format} of every kind of answer; altered answers, wrong robots, wrong bodies."""
 
 from __future__ import annotations
 

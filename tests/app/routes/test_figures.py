@@ -1,6 +1,4 @@
-"""Figures identified on one arm: stored, used by every endpoint, moved, deleted; and what makes
-none.
-"""
+"""Identified figures of an arm: stored, used by every endpoint, moved, deleted, and refused."""
 
 from __future__ import annotations
 
@@ -69,7 +67,7 @@ def test_figures_are_stored_shown_and_deleted(client: TestClient) -> None:
 
 
 def test_a_file_for_the_library(client: TestClient, stored: str, tmp_path: Path) -> None:
-    """What the service computes with them, the library computes with the file."""
+    """The library computes the same from the file as the service from the stored figures."""
     answer = client.get(f"/figures/{stored}", headers={"accept": "application/yaml"})
     assert answer.headers["content-type"].startswith("application/yaml")
     file = tmp_path / "my_ur5e.yaml"
@@ -94,7 +92,7 @@ def test_every_request_about_a_motion_takes_them(client: TestClient, stored: str
     )
     assert own["energy"]["electrical"]["friction"] != used["energy"]["electrical"]["friction"]
     assert own["energy"]["electrical"]["interval"] != used["energy"]["electrical"]["interval"]
-    # and the robot's own figures are what they were
+    # The robot's own figures have not changed.
     again = client.post("/optimize", json=move()).json()
     assert again["energy"]["electrical"]["total"] == own["energy"]["electrical"]["total"]
     motion = {"configurations": [HOME, NEAR], "time_per_segment": 1.5}
@@ -118,7 +116,7 @@ def test_every_request_about_a_motion_takes_them(client: TestClient, stored: str
         "/whatif", json={"evaluate": motion | {"figures": stored}, "changes": changes}
     ).json()["base"]
     assert base["electrical"]["friction"] == pytest.approx(energies[1], rel=1e-9)
-    # an answer says which figures it is of, so that others can compute with it
+    # The answer names its figures, so other endpoints can compute with it.
     assert used["arm"]["figures"] == stored
     assert client.post("/export/csv", json={"answer": used["answer"]}).status_code == 200
     job = client.post("/jobs", json={"requests": [{"optimize": move(figures=stored)}]})

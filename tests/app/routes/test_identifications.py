@@ -1,4 +1,4 @@
-"""Identifications over HTTP: from a log to figures, and what is refused."""
+"""Identifications over HTTP: from a log to figures, and refusals."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from tests.selection import long_but
 ROBOT = load_robot("ur5e")
 TRUTH = truth_of(ROBOT)
 CSV = {"Content-Type": "text/csv"}
-# relative; every k-th row stands for all of them
+# relative; every k-th row stands for all rows
 THINNED = 0.15
 MOST_BYTES = 500_000  # of the residuals of logs of any length
 NOBODY = "3d0b7c55-8e0a-4a6b-b1f0-7a5d9c2e4f18"
@@ -63,7 +63,7 @@ def add_log(
 
 
 def ended(client: TestClient, **body: Any) -> Any:
-    """The identification that a body asks for, after its end."""
+    """The ended identification of a body."""
     answer = client.post("/identifications", json=body)
     assert answer.status_code == 202, answer.text
     made = Identification.model_validate_json(answer.content)
@@ -109,7 +109,7 @@ def test_a_log_becomes_figures(client: TestClient, log: str) -> None:
     matrix = np.array(result.document["covariance"]["matrix"])
     assert "friction_laws.identified.coulomb.1" in names and "electronics.idle_power" in names
     assert matrix.shape == (len(names), len(names)) and np.linalg.eigvalsh(matrix)[0] > -1e-9
-    # stored with the end of the job, under the id that its content has on every server
+    # stored at the end of the job, under an id from its content, equal on every server
     stored = client.put("/figures", json=result.document)
     assert stored.status_code == 200 and stored.json()["id"] == whole.figures, stored.text
     motion = {
@@ -273,7 +273,7 @@ def test_a_method_that_the_log_does_not_fit_is_a_problem(
 @pytest.mark.long
 def test_a_payload_is_the_difference_of_two_logs(client: TestClient, log: str) -> None:
     carried = Payload(2.0, np.array([0.01, -0.02, 0.05]))
-    # what the log says of its payload is wrong
+    # the log states a wrong payload
     loaded = add_log(client, truth=replace(TRUTH, payload=carried), without="P")
     result = done(client, logs=[log, loaded], fit=["payload"])
     assert result.payload is not None

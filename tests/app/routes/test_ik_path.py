@@ -1,6 +1,4 @@
-"""POST /ik/path along positions and poses, with the points that are left out; and POST /ik among
-obstacles.
-"""
+"""POST /ik/path along positions and poses, with left-out points; POST /ik among obstacles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Jobs over HTTP: their life, their results, what is refused, `Prefer: respond-async`."""
+"""Jobs over HTTP: their life, their results, refusals, `Prefer: respond-async`."""
 
 from __future__ import annotations
 

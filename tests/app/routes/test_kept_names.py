@@ -1,4 +1,4 @@
-"""Names of what the service keeps: given, found by a search, taken away, and refused alike."""
+"""Names of stored things: given, found by a search, taken away, and refused alike."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_identifications_are_jobs_that_a_list_of_jobs_may_leave_out(recorded: Te
     assert {identification, job} <= listed(limit=200)
     without = listed(limit=200, identifications="false")
     assert job in without and identification not in without
-    # a job that is no identification is not named or deleted as one
+    # a job other than an identification is not named or deleted as one
     refused(recorded.patch(f"/identifications/{job}", json={"name": "x"}), UnknownIdentification)
     refused(recorded.delete(f"/identifications/{job}"), UnknownIdentification)
     assert recorded.get(f"/jobs/{job}").status_code == 200

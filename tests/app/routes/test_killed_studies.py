@@ -1,4 +1,4 @@
-"""What was acknowledged of a study outlives a service that is killed."""
+"""Acknowledged parts of a study outlive a killed service."""
 
 from __future__ import annotations
 

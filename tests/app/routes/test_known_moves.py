@@ -1,6 +1,4 @@
-"""Cycles in one cell have moves in common: those that were found before are found again, and
-answers are the same.
-"""
+"""Cycles of one cell share moves: known moves are found again, with the same answers."""
 
 from __future__ import annotations
 
@@ -29,7 +27,7 @@ def sent(client: TestClient, body: Any, **headers: str) -> Any:
 
 
 def solves(client: TestClient, answer: Any) -> list[int]:
-    """How many nonlinear programs were solved for each move."""
+    """Number of solved nonlinear programs of each move."""
     moves = [
         client.get(leg["answer"]).json()["answer"]
         for leg in answer["legs"]
@@ -67,6 +65,6 @@ def test_cycles_of_jobs_share_them_with_those_that_are_answered_at_once(client: 
     job = client.post("/jobs", json={"requests": [{"cycle": a_cycle(0.114, NEAR)}]}, headers=KNOWN)
     assert ended(client, job.headers["location"])["state"] == "done"
     (line,) = client.get(f"{job.headers['location']}/results").text.splitlines()
-    # the move home is another one than that from the second stop
+    # the move home differs from the move out of the second stop
     assert list(map(bool, solves(client, orjson.loads(line)["result"]))) == [False, True]
     assert not any(solves(client, sent(client, a_cycle(0.114, NEAR))))

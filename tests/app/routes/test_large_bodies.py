@@ -1,4 +1,4 @@
-"""A body that a worker reads gets the same answer as one that the service reads itself."""
+"""A body read by a worker gets the same answer as a body read by the service itself."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ REFUSED: list[tuple[str, Any]] = [
 
 
 def sent(client: TestClient, path: str, body: bytes) -> tuple[int, Any]:
-    """Status and content of the answer, without what differs from one request to the next."""
+    """Status and content of the answer, without the fields that differ between equal requests."""
     answer = client.post(path, content=body, headers={"content-type": "application/json"})
     content = answer.json()
     return answer.status_code, {

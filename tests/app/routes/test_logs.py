@@ -219,8 +219,7 @@ def test_unknown_columns_are_not_echoed(client: TestClient, recording: Recording
 
 
 def test_over_a_real_socket(server: Server, recording: Recording) -> None:
-    """Good and broken logs at the same time: each gets its own answer, and a stored one
-    survives."""
+    """Good and broken logs at the same time get their own answers, and a stored log survives."""
     good = csv_of(recording)
     bodies = [
         good,

@@ -1,4 +1,4 @@
-"""POST /optimize: answers hold what the contract promises."""
+"""POST /optimize: answers keep the promises of the contract."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from joulepath.optimizer.result.certificate import Certificate
 from tests.app.requests import EXAMPLES, move
 from tests.selection import long_but
 
-# of numbers that are computed in one place and only passed on
+# tolerance of numbers computed in one place and only passed on
 EXACT = 1e-12
 
 
-# each in every run; the others are answered by the test of the OpenAPI document
+# the examples of every run; the test of the OpenAPI document sends the others
 QUICK = ("joint_to_pose", "pose_to_pose", "storage_on_the_bus", "over_a_post")
 
 

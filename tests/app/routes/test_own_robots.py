@@ -1,4 +1,4 @@
-"""Robots of users' own: added, used by every endpoint, replaced, deleted; and what makes none."""
+"""Robots of users: added, used by every endpoint, replaced, deleted, and refused."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_the_robots_of_the_service_stay(client: TestClient) -> None:
 
 
 def test_a_robot_has_another_title(mine: TestClient) -> None:
-    """Its name in requests stays, and so does what was computed with it."""
+    """A new title changes neither the robot's name in requests nor its stored answers."""
     cached = {"Cache-Control": "max-age=600"}
     kept = mine.post("/optimize", json=MOVE, headers=cached).json()["id"]
     title = f"50% tray {uuid4().hex[:6]}"
@@ -119,7 +119,8 @@ def test_every_endpoint_knows_it(mine: TestClient) -> None:
     assert mine.post(f"/studies/{study}/iterations", json=step).status_code == 201
     suggested = mine.get(f"/studies/{study}/suggest", params={"deadline": 60})
     assert suggested.status_code == 200
-    # a shorter motion may be impossible; orientations that two joints do not hold are not suggested
+    # A shorter motion may be impossible; no orientation is suggested beyond the reach of two
+    # joints.
     assert {each["problem"] for each in suggested.json()["not_computed"]} <= {"duration-too-short"}
     assert {each["step"] for each in suggested.json()["suggestions"]} >= {"duration"}
 
@@ -241,7 +242,7 @@ def test_doubts_about_a_urdf_are_kept_with_the_robot(client: TestClient) -> None
 
 
 def test_joints_that_follow_others(client: TestClient) -> None:
-    """The joints of the robot are those with motors, in requests, answers and files."""
+    """The joints of the robot are its joints with motors, in requests, answers and files."""
     palletiser = {"urdf": PALLETISER, "tip": "tool", "acceleration": 8.0, "payload": 5.0}
     joints = ["a1", "a2", "a3", "a4"]
     try:

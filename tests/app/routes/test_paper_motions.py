@@ -1,6 +1,4 @@
-"""The founding paper's experiment through POST /evaluate, and the page that sets its tables beside
-ours.
-"""
+"""The founding paper's experiment through POST /evaluate, and the page with both sets of tables."""
 
 from __future__ import annotations
 
@@ -19,8 +17,7 @@ from tests.app.live import ROOT
 PRINTED = np.loadtxt(
     ROOT / "tests" / "reference" / "paper_table3_power.csv", delimiter=",", skiprows=1
 )[:, 1]
-# printed figures may differ by rounding in their last digit, optimised ones by what solvers make of
-# another machine
+# Printed figures may differ by rounding in their last digit, optimised ones between machines.
 LAST_DIGIT = 1.01
 OPTIMISED = 0.005
 

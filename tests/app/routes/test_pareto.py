@@ -1,6 +1,4 @@
-"""POST /pareto: the front as the contract lays it out, its answers by reference, and what is
-refused.
-"""
+"""POST /pareto: the layout of the contract, answers by reference, and refusals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""GET /robots/{name}/meshes.glb. Where the meshes stand: `tests/models/test_form.py`."""
+"""GET /robots/{name}/meshes.glb; `tests/models/test_form.py` tests the places of the meshes."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_an_unknown_robot(client: TestClient, name: str) -> None:
 
 @pytest.mark.long
 def test_two_processes_make_one_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Were the file written twice, one of them would have seen another inode."""
+    """A file written twice would show another inode to one of the processes."""
     monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path / "cache"))
     both = [
         subprocess.Popen([sys.executable, "-c", MAKE], cwd=ROOT, stdout=subprocess.PIPE)

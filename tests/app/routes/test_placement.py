@@ -1,4 +1,4 @@
-"""POST /placement: the answer's cycles are those of `POST /cycle` at the same places."""
+"""POST /placement: the cycles of the answer equal `POST /cycle` at the same places."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def placed(client: TestClient, body: Json) -> Json:
 
 @pytest.fixture(scope="module")
 def found(client: TestClient) -> Json:
-    """What `ASKED` comes to."""
+    """The answer to `ASKED`."""
     return placed(client, ASKED)
 
 

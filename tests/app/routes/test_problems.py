@@ -39,7 +39,7 @@ DOWN = [0.0, 1.0, 0.0, 0.0]
 
 
 def refused(answer: Any, kind: type[DeclaredError]) -> dict[str, Any]:
-    """The content of an answer that must be a problem of that kind."""
+    """The content of an answer, checked to be a problem of the given kind."""
     assert answer.status_code == kind.status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
     checked(kind, answer.content)
@@ -49,7 +49,7 @@ def refused(answer: Any, kind: type[DeclaredError]) -> dict[str, Any]:
     return content
 
 
-# stretched straight up, where shoulder, elbow and wrist are all singular
+# stretched straight up, with shoulder, elbow and wrist all singular
 UPRIGHT = {"position": [0.0, -0.2329, 1.0794], "rpy": [1.5707963267948966, 0.0, 0.0]}
 
 
@@ -81,8 +81,9 @@ def test_unreachable_pose(client: TestClient) -> None:
 
 
 def problem_of_ik(pose: Any) -> dict[str, Any]:
-    """The problem of a request whose task runs here, where a test can change what the arm can
-    do."""
+    """The problem of a request with its task in this process, so tests can change the arm's
+    abilities.
+    """
     with pytest.raises(JoulepathError) as raised:
         IKTask(IKRequest.model_validate({"pose": pose}), "the-id").run(AMPLE)
     return problem_of(raised.value, "the-id")
@@ -204,7 +205,8 @@ def test_body_too_large(client: TestClient, declared: bool) -> None:
 
 
 def test_not_ready(tmp_path: Any) -> None:
-    # the engine starts with the lifespan, which is not entered here: it is at its very beginning
+    # The engine starts with the lifespan, which is not entered here, so it is at its very
+    # beginning.
     app = create_app(Settings(workers=1))
     with TestClient(app, base_url=LOCAL) as client:
         answer = client.get("/readyz")

@@ -1,6 +1,4 @@
-"""POST /replay: answers by their id and whole, moves of a cycle, points of a front; what makes no
-replay.
-"""
+"""POST /replay: answers by id and whole, moves of a cycle, points of a front, and refusals."""
 
 from __future__ import annotations
 
@@ -17,7 +15,7 @@ from joulepath.app.schemas.examples.own_arm import ARM
 from tests.app.requests import HOME, NEAR, PATIENT, move
 from tests.app.routes.test_problems import refused
 
-# what the simulation's own tests hold to a hundredth of it
+# a hundred times the tolerances of the simulation's own tests
 JOINT = 3e-4
 ELECTRICAL = 5e-4
 LOADED = move(payload={"mass": 2.0, "com": [0.0, 0.0, 0.06]}, gravity=[0.0, 4.9, -8.5])
@@ -103,7 +101,7 @@ def test_savings_under_changes(client: TestClient, loaded: dict[str, Any]) -> No
 
 
 def test_a_contact_is_reported(client: TestClient) -> None:
-    """Under the PD loop alone the arm sags onto a table that it would clear by a millimetre."""
+    """Under the PD loop alone, the arm sags onto a table that its motion clears by a millimetre."""
     table = {"name": "table", "shape": "box", "size": [1.0, 1.0, 0.1], "margin": 0.0}
     at = {"pose": {"position": [0.0, 0.6, 0.0], "rpy": [0.0, 0.0, 0.0]}}
     request = move(
@@ -126,8 +124,9 @@ def test_a_contact_is_reported(client: TestClient) -> None:
 
 
 def test_the_moves_of_a_cycle(client: TestClient) -> None:
-    """Each with what the arm carries on it, within the limits and among the obstacles of its
-    stop."""
+    """A move is replayed with its payload, within the limits and among the obstacles of
+    its stop.
+    """
     stops = [
         {
             "name": "pick",

@@ -1,4 +1,4 @@
-"""POST /report: what the page says, what is attached to it, and what a check of it finds."""
+"""POST /report: the text of the page, its attachments, and the findings of the check."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ def test_a_way_that_needs_less_in_its_own_time_is_told(client: TestClient) -> No
 def test_a_motion_without_energy_or_that_gives_some(
     client: TestClient, regeneration: float, goal: float, sign: int
 ) -> None:
-    """At rest without idle power; and downwards, into a bus that takes energy back."""
+    """A motion at rest without idle power, and one downwards, into a bus that takes energy back."""
     arm = ARM | {"electronics": {"idle_power": 0.0, "regeneration": regeneration}}
     free = {"rotor_inertia": 1e-3, "coulomb": 0.0, "viscous": 0.0, "copper": 1e-3}
     assert client.put("/robots/free", json=arm | {"drives": free}).status_code in (200, 201)

@@ -1,5 +1,4 @@
-"""POST /report on a placement: its map, its best place against the nominal one, and what a check of
-it finds."""
+"""POST /report on a placement: its map, its best place against the nominal one, and its check."""
 
 from __future__ import annotations
 
@@ -131,7 +130,7 @@ def test_the_map_shows_the_best_of_each_column_and_marks_the_others() -> None:
     ]
     columns = columns_of(places)
     assert [each["energy"] for each in columns] == [10.0, 20.0, None, None]
-    # one height was left out, so that the column may work
+    # One height was not computed, so the column may be feasible.
     assert [each["reason"] for each in columns] == [None, None, None, "torque"]
     drawing = drawn_map(places, places[1], None)
     assert drawing.count("<rect") == 2 + 7 and "left out" in drawing

@@ -1,4 +1,4 @@
-"""POST /report on a job and on a log: sums and tables, and what a check of them finds."""
+"""POST /report on a job and on a log: sums, tables, and the findings of the check."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def reported(client: TestClient, **body: Any) -> bytes:
 
 @pytest.fixture(scope="module")
 def job(client: TestClient) -> str:
-    """Two motions, one that cannot be, one request without a motion of its own, and a cycle."""
+    """Two motions, an impossible one, a request without a motion of its own, and a cycle."""
     requests = [
         optimization(1.0) | {"name": "bin to shelf"},
         optimization(2.0) | {"name": "shelf *<to>* bin"},
@@ -57,7 +57,7 @@ def page(client: TestClient, job: str) -> bytes:
 
 @pytest.fixture(scope="module")
 def log(client: TestClient) -> str:
-    """A log of an arm that differs from the robot's figures, with its true power."""
+    """A log of an arm off the robot's figures, with its true power."""
     body = csv_of(recorded(ROBOT, truth_of(ROBOT), moves=3))
     answer = client.post("/logs", content=body, params={"name": "morning"}, headers=CSV)
     assert answer.status_code == 201, answer.text
@@ -81,7 +81,7 @@ def test_a_job_is_summed_and_listed(page: bytes) -> None:
 
 
 def test_savings_of_a_job_are_those_of_its_moves(page: bytes) -> None:
-    """The nearest usual way of each move, and no other."""
+    """The savings sum up the nearest usual way of every move, and no other."""
     text, rows = page.decode(), attached_to(page).moves
     ours = theirs = 0.0
     for row in rows:
@@ -177,7 +177,7 @@ def test_pages_of_a_table_repeat_its_head(client: TestClient, job: str) -> None:
 
 
 def test_numbers_of_stops_do_not_cover_each_other() -> None:
-    """Nor are any left out that have room."""
+    """Nor are numbers left out where there is room for them."""
     for count, shown in ((9, 9), (200, 40)):
         stops = [Stop((k + 0.5) / count, k + 1, False) for k in range(count)]
         legs = [Leg(k / 2, 0.5, 1.0, False, False) for k in range(2)]

@@ -39,7 +39,7 @@ def test_robots(client: TestClient) -> None:
     }
     payloads = {robot.name: robot.rated_payload for robot in robots}
     assert (payloads["ur5e"], payloads["ur10e"]) == (5.0, 12.5)
-    # copper loss of the one is a rule's, of the other a sister robot's: no reader may miss that
+    # One copper loss comes from a rule, the other from a sister robot: no reader may miss either.
     trust = {robot.name: robot.energy_trust for robot in robots}
     assert "engineering defaults without a source (copper loss" in trust["ur3e"]
     assert "transferred from a sister robot (copper loss" in trust["ur5e"]

@@ -1,5 +1,5 @@
-"""Studies over HTTP: their life, their figures, what is refused, and what is left when the service
-is killed.
+"""Studies over HTTP: their life, their figures, refusals, and their state after a killed
+service.
 """
 
 from __future__ import annotations

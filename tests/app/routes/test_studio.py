@@ -1,5 +1,5 @@
-"""The files of the studio page and of the help pages as they are served. `tests/browser` tests what
-they show.
+"""The served files of the studio page and of the help pages; `tests/browser` tests their
+contents.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def test_nothing_else_is_served(client: TestClient, path: str) -> None:
 
 
 def test_the_first_load_is_small(client: TestClient) -> None:
-    """The page and everything that it may load, whether it needs it or not."""
+    """The limit holds for the page with everything that it may load."""
     names = [path.name for path in PAGE.iterdir() if path.suffix not in (".html", ".txt")]
     answers = {path: client.get(path) for path in ("studio", *(f"studio/{n}" for n in names))}
     assert {answer.status_code for answer in answers.values()} == {200}
@@ -90,8 +90,9 @@ def test_the_first_load_is_small(client: TestClient) -> None:
 
 
 def test_the_libraries_are_those_that_are_pinned() -> None:
-    """With digests, and without an address: npm asks whatever registry it is set to. The licences
-    of all that is in the bundle are beside it.
+    """Versions are pinned by digests, without addresses: npm uses its configured registry.
+
+    The licences of all libraries in the bundle are beside it.
     """
     lock = json.loads((SOURCES / "package-lock.json").read_text())
     pins = json.loads((SOURCES / "package.json").read_text())
@@ -136,7 +137,7 @@ def test_a_slash_behind_the_address_leads_to_the_page(client: TestClient) -> Non
 
 @pytest.fixture(scope="module")
 def idle() -> TestClient:
-    """The service without its workers, which no page needs."""
+    """The service without its workers: pages need none."""
     return TestClient(create_app(), base_url=LOCAL)
 
 

@@ -1,4 +1,4 @@
-"""What a study is told to try next: every figure is what the request comes to when it is sent."""
+"""Suggestions for a study: every figure equals the result of the suggested request."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_three_seconds_are_too_many_and_a_line_is_a_spline(slow: Any) -> None:
     _, content = slow
     free, *others = steps(content, "duration")
     assert free["request"]["optimize"].get("duration") is None
-    # 37 W of idle power for the time that is saved, and more for holding the load meanwhile
+    # 37 W of idle power for the saved time, and the power of holding the load on top
     assert free["gain"] > 37 * 0.9 * (3.0 - free["duration"])
     assert free["energy"] <= min(other["energy"] for other in others) * (1 + 1e-3)
     (payload,) = steps(content, "payload")
@@ -109,7 +109,7 @@ def test_other_orientations_are_of_the_same_point(slow: Any) -> None:
         for entry in steps(content, "branch")
         if "pose" in entry["request"]["optimize"]["goal"]
     ]
-    # inverse kinematics, which has forward kinematics of its own, finds the way back
+    # Inverse kinematics, with forward kinematics of its own, finds the way back.
     pose = QuaternionPose(**branch["request"]["optimize"]["goal"]["pose"])
     solutions = inverse_kinematics_for(robot).solve(to_matrix(pose), T_tcp)
     assert min(np.abs(solution.q - NEAR).max() for solution in solutions) < 1e-9

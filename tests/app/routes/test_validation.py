@@ -1,4 +1,6 @@
-"""What is malformed is refused as `validation`, names the field, and is not repeated."""
+"""Malformed input is refused as `validation`: the error names the field without repeating its
+value.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,7 @@ POSE = {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
 def refused(
     client: TestClient, body: bytes | str | dict[str, Any], path: str = "/optimize"
 ) -> list[dict[str, Any]]:
-    """The `errors` of a body that is refused."""
+    """The `errors` of a refused body."""
     content = json.dumps(body) if isinstance(body, dict) else body
     answer = client.post(path, content=content, headers={"content-type": "application/json"})
     assert answer.status_code == 422, answer.text
@@ -181,7 +183,10 @@ def test_what_is_declared_as_something_else_is_told_so(
 def test_every_json_body_is_read_strictly_as_common_clients_declare_it(
     client: TestClient, content_type: str | None
 ) -> None:
-    """No type, that of `curl -d`, and plain text are JSON on every path; a name occurs once."""
+    """A body without a type, with the type of `curl -d`, or as plain text is JSON on every path.
+
+    A name occurs once.
+    """
     headers = {} if content_type is None else {"content-type": content_type}
     paths = open_document()["paths"]
     taking_json = [
@@ -198,7 +203,7 @@ def test_every_json_body_is_read_strictly_as_common_clients_declare_it(
 
 
 def test_a_bag_may_be_sent_as_the_refusal_of_another_type_says(client: TestClient) -> None:
-    """A bag of ROS 2 is no CSV, and its own type is refused: the type that is named is taken."""
+    """The own type of a ROS 2 bag is refused, but the type named in the refusal is accepted."""
     refusal = client.post(
         "/logs", content=b"\x89MCAP", headers={"content-type": "application/mcap"}
     )
@@ -272,7 +277,9 @@ def test_every_unknown_field_is_named(client: TestClient) -> None:
 
 
 def test_other_errors_are_named_beside_unknown_fields(client: TestClient) -> None:
-    """All at once, at every level; but of a misspelt field, not that it is missing."""
+    """All errors are named at once, at every level; but a misspelt field is not reported as
+    missing.
+    """
     body = move(colour="red", deadline=-3.0, start={"q": [0.0, 0.0, "a"], "speed": 1})
     body["gaol"] = body.pop("goal")
     found = {tuple(error["loc"][1:]) for error in refused(client, body)}
@@ -293,8 +300,7 @@ def test_very_many_other_errors_are_not_listed_beside_unknown_fields(client: Tes
 def test_thousands_of_unknown_fields_take_no_time(
     client: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each comparison with the known names takes some 60 microseconds of the service's own
-    process."""
+    """A comparison with the known names takes some 60 microseconds of the service's own process."""
     compared = []
 
     def count(name: str, *_: Any, **__: Any) -> list[str]:

@@ -1,6 +1,4 @@
-"""POST /whatif: differences against separate requests, zero where nothing differs, physics, and
-what is refused.
-"""
+"""POST /whatif: equality with separate requests, zero differences, physics, and refusals."""
 
 from __future__ import annotations
 
@@ -23,8 +21,8 @@ from tests.optimizer.moves import tcp_pose
 
 # the same computation on another route: sums in another order
 SAME = 1e-12
-# a motion found for the changed arm begins, where it must, with the base's: as good as a separate
-# request or better
+# The search of the changed arm starts from the base's motion if it must, so its result is as good
+# as a separate request or better.
 LOCAL = 1e-3
 # enough for every run on a busy machine
 TIME = 60.0
@@ -61,7 +59,7 @@ def kept(client: TestClient, path: str, kind: str) -> dict[str, Any]:
 
 
 def figures(energy: dict[str, Any], duration: float) -> dict[str, Any]:
-    """The figures of a full answer that a base and its changes are compared by, flat."""
+    """The figures compared between a base and its changes, flat, from a full answer."""
     parts = {
         f"electrical.{name}": value
         for name, value in energy["electrical"].items()
@@ -144,7 +142,9 @@ def test_is_the_difference_of_two_optimizations(
 def test_same_motion_is_the_bases_on_the_changed_arm(
     client: TestClient, optimized: dict[str, Any], name: str
 ) -> None:
-    """Against /evaluate of the base's samples, whose splines are not the motion's own."""
+    """The comparison is with /evaluate of the base's samples, whose splines differ from the
+    motion's.
+    """
     base = kept(client, optimized["base"]["answer"], "optimize")
     log = {field: base["trajectory"][field] for field in ("t", "q", "v", "a")}
     arm = {"payload": LOAD} | CHANGES[name]
@@ -287,8 +287,8 @@ def test_refuses_what_cannot_be_asked(
     "text", ["stored/0", "/answers/0", "{0}", "%s", "\\u007fkept/0\\u007f", '","answer":"']
 )
 def test_texts_of_the_caller_come_back_as_they_are(client: TestClient, text: str) -> None:
-    """A change's name, and an obstacle's in the problem of a change; paths of answers lead where
-    they say.
+    """Names of changes and of obstacles in problems come back unchanged; paths of answers are
+    valid.
     """
     pose = {"position": tcp_pose(np.array(HOME)).T[:3, 3].tolist(), "rotvec": [0, 0, 0]}
     ball = {"name": text, "shape": "sphere", "radius": 0.15, "pose": pose}

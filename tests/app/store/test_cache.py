@@ -1,6 +1,4 @@
-"""Answers by their requests, in SQLite and PostgreSQL: what takes the place of what, and two at the
-same time.
-"""
+"""Answers by their requests, in SQLite and PostgreSQL: replacement, and two at the same time."""
 
 from __future__ import annotations
 
@@ -61,5 +59,5 @@ async def test_two_that_remember_the_same_at_the_same_time(store: Store) -> None
     await asyncio.sleep(0.2)
     may_end.set()
     ids = await first, await second
-    # in PostgreSQL, the first; in SQLite, which has one writer at a time, the last
+    # in PostgreSQL, the first; in SQLite, with one writer at a time, the last
     assert (await known(store, ASKED, OTHER)) in [{"a": each, "b": ids[1]} for each in ids]

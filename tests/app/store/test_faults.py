@@ -1,6 +1,4 @@
-"""A database that is full, read-only, locked, deleted or replaced under a running service: seen,
-said, and bounded.
-"""
+"""Databases full, read-only, locked, deleted or replaced under a service: detected and reported."""
 
 from __future__ import annotations
 
@@ -112,7 +110,7 @@ async def test_a_read_only_database_is_read(database: Path) -> None:
 async def test_a_lock_of_another_process_is_waited_for_once(database: Path, store: Store) -> None:
     now = 0.0
     kept = await store.write(put)
-    # the clock stands for the wait, which is left out
+    # The clock replaces the wait.
     began = iter((0.0, 0.0, 100.0, 100.0))
     with closing(sqlite3.connect(database, isolation_level=None)) as other:
         other.execute("BEGIN IMMEDIATE")

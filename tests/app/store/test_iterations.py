@@ -1,6 +1,4 @@
-"""Iterations of a study: the best so far and the first below the threshold are kept with each,
-whatever its length.
-"""
+"""Iterations of a study keep the best so far and the first below the threshold, at any length."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ BODY = packed(b"{}")
 
 
 class Bench:
-    """A database of jobs, and those who work on them, at a time that the test moves."""
+    """A database of jobs with its workers, at a time set by the test."""
 
     def __init__(self, store: Store) -> None:
         self.store, self.now = store, START
@@ -130,9 +130,7 @@ async def test_a_renewed_lease_is_kept(bench: Bench) -> None:
 
 
 async def test_many_holders_never_get_the_same_request(bench: Bench) -> None:
-    """Services that share a database: each request is leased once, and events are numbered without
-    gaps.
-    """
+    """Services on one database lease every request once and number the events without gaps."""
 
     async def work(name: str, got: list[Lease]) -> None:
         while found := await bench.lease(name, 3):
@@ -162,7 +160,7 @@ async def test_a_short_job_does_not_wait_for_the_end_of_a_long_one(bench: Bench)
 
 
 async def test_jobs_take_turns_in_the_order_in_which_they_came(bench: Bench) -> None:
-    """None waits behind later ones for ever; ids tell times apart by milliseconds."""
+    """No job waits behind later jobs for ever; ids tell times apart by milliseconds."""
     made = list[str]()
     for _ in range(8):
         made.append(await bench.create(1))

@@ -1,5 +1,5 @@
-"""Motions of cells in SQLite and PostgreSQL: those used last are found, and two may keep the same
-at the same time.
+"""Motions of cells in SQLite and PostgreSQL: the last used are found; equal ones may be kept at
+once.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""The store: migrations, several processes at once, answers and their limits, a database that is
-not there.
-"""
+"""The store: migrations, several processes at once, answers and limits, a missing database."""
 
 from __future__ import annotations
 
@@ -72,7 +70,7 @@ def until_refused(server: Server, cause: str | None) -> None:
 
 
 def tables(url: str) -> list[Any]:
-    """How the database differs from what the models say."""
+    """The differences between the tables of the database and the models."""
     engine = create_database_engine(url)
     with engine.connect() as connection:
         differences = compare_metadata(MigrationContext.configure(connection), Table.metadata)
@@ -193,7 +191,7 @@ def test_several_processes_may_migrate_at_once(url: str) -> None:
 
 
 def test_a_new_file_that_another_process_makes_is_waited_for(tmp_path: Path) -> None:
-    """SQLite itself does not wait where a file without a log is to get one."""
+    """SQLite itself does not wait while another process gives a new file its log."""
     file = tmp_path / "joulepath.db"
     other = sqlite3.connect(file, isolation_level=None, check_same_thread=False)
     other.execute("BEGIN IMMEDIATE")
@@ -255,7 +253,7 @@ async def test_answers_are_kept_whole(store: Store) -> None:
 
 
 async def test_typed_texts_take_room(store: Store) -> None:
-    """Only the last ones that were told."""
+    """The size of an answer counts only its last typed texts."""
     kept = await store.write(put)
     before = await store.read(lambda session: session.get_one(Answer, kept).size)
     client = Client("127.0.0.1")

@@ -16,7 +16,7 @@ ASKED = Asked("key", 10.0)
 
 
 class Bench:
-    """Requests that compute when the test lets them."""
+    """Requests computed at the test's command."""
 
     def __init__(self) -> None:
         self.in_flight, self.free = InFlight(), asyncio.Event()

@@ -1,6 +1,4 @@
-"""The process that workers are forked from. It ignores an import that fails, so that only a test
-sees one.
-"""
+"""The parent process of all workers ignores a failed import, so only a test detects it."""
 
 from __future__ import annotations
 
