@@ -1,4 +1,4 @@
-"""The terms of dual bounds by numpy, the references of those by the C library."""
+"""The terms of dual bounds in numpy, as references for the C library."""
 
 from __future__ import annotations
 
@@ -57,12 +57,12 @@ def grid_points(
 
 
 def _sides(term: Callable[[slice], Array]) -> Array:
-    """A term of the nodes at both ends of each step, (S, 2, ...)."""
+    """A nodal term at both ends of every step, shape (S, 2, ...)."""
     return np.stack([term(slice(None, -1)), term(slice(1, None))], axis=1)
 
 
 def _of_corners(cells: GridCells, points: Array, reduce: Callable[[Array, Array], Array]) -> Array:
-    """What the corners' values (..., points, k) are reduced to in each cell (..., cells, k)."""
+    """Reduction of corner values (..., points, k) to the values of the cells (..., cells, k)."""
     n, m = map(len, cells.axes)
     value = points.reshape(*points.shape[:-2], n, m, points.shape[-1])
     value = reduce(value[..., 1:, :, :], value[..., :-1, :, :])
@@ -71,7 +71,7 @@ def _of_corners(cells: GridCells, points: Array, reduce: Callable[[Array, Array]
 
 
 def _between(cells: GridCells, second: Array) -> Array:
-    """Σ h² / 8 · second (S, 2, k) over the sides of each cell (S, cells, k)."""
+    """Σ h² / 8 · second (S, 2, k) over the sides of the cells, shape (S, cells, k)."""
     first, other = (np.diff(axis) ** 2 / 8 for axis in cells.axes)
     both = (
         second[:, 0, None, None] * first[:, None, None] + second[:, 1, None, None] * other[:, None]
@@ -105,7 +105,7 @@ def least_potential(potential: LeastPotential, weights: Weights, fast: Array, sl
 
 
 def _beside(potential: LeastPotential, weights: Weights, fast: Array, slow: Array) -> Array:
-    """What the joints beside the grid's can take from Ψ (B, S, 2, cells) [W]."""
+    """Largest decrease of Ψ by the joints outside the grid, shape (B, S, 2, cells) [W]."""
     terms, scale, b2, hold = potential.terms, weights.scale, fast[:, None] ** 2, _hold(weights)
     taken, cross_terms = (
         np.zeros((len(fast), *terms.steepness.shape[:-1])),
@@ -128,7 +128,7 @@ def _beside(potential: LeastPotential, weights: Weights, fast: Array, slow: Arra
 def greatest(
     friction: FrictionConjugate, p: Array, omega: Array, square: Array, most: Array
 ) -> tuple[Array, Array]:
-    """The upper bounds (..., nq) of `greatest` in `speed_conjugate.c`, and where they are."""
+    """The upper bounds of `greatest` in `speed_conjugate.c` and the maximisers, both (..., nq)."""
     shape = np.broadcast_shapes(p.shape, omega.shape, square.shape, most.shape)
     best, where = np.zeros(shape), np.zeros(shape)
     limit = most[..., None, :]
@@ -178,15 +178,15 @@ def speed_conjugate(conjugate: SpeedConjugate, weights: Weights) -> tuple[Array,
 
 
 def _ends(parts: TimeParts, nodes: Array) -> Array:
-    """Values (P, 2, nq) at both ends of each part, of what is linear between nodes (steps + 1,
-    nq)."""
+    """Interpolated values (P, 2, nq) at both ends of the parts, from nodes (steps + 1, nq)."""
     first, last = nodes[parts.step, None], nodes[parts.step + 1, None]
     return np.asarray(first + parts.within[..., None] * (last - first))
 
 
 def _multiplier(conjugate: SpeedConjugate, weights: Weights, which: int) -> Array:
-    """m (nq,) [N·m] for the first or last duration with which the speeds of H cover the
-    displacement.
+    """Multiplier m (nq,) [N·m] for the first or last duration.
+
+    The speeds of H at m cover the displacement.
     """
     terms, duration, costate = conjugate.terms, conjugate.duration[which], conjugate._costate
     scale, friction = weights.scale, conjugate.friction
@@ -213,8 +213,9 @@ def _height(
     stiffness: Array,
     most: Array,
 ) -> tuple[Array, Array]:
-    """H (..., nq) [W] for these p, ω, speeds b of the path, κ + μ + ν and greatest speeds, and
-    where it is.
+    """The maximum H (..., nq) [W] and its maximiser.
+
+    The arguments are p, ω, the speeds b of the path, κ + μ + ν, and the greatest speeds.
     """
     more, slowness = 1 + 2 * weights.work, conjugate._slowness(weights)
     linear = p - stiffness * b + slowness * omega

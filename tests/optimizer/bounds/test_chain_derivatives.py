@@ -48,8 +48,11 @@ def test_torques_and_inertia_are_pinocchios(name: str) -> None:
 
 @pytest.mark.parametrize("name", list(ARMS))
 def test_no_derivative_exceeds_its_bound(name: str) -> None:
-    """First to third derivatives of the inertia, second and third of the potential energy, by
-    differences; among them some that come near the bound."""
+    """The derivatives of the inertia and of the potential energy are below their bounds.
+
+    Differences give the first to third derivatives of the inertia, and the second and third of the
+    potential energy. Some come near the bound.
+    """
     chain, q = ChainDerivatives.of(ARMS[name]), configurations(2, 300)
     U2, U3 = chain.potential_bound(2), chain.potential_bound(3)
     D1, D2, D3 = (chain.inertia_bound(n) for n in (1, 2, 3))
@@ -79,7 +82,7 @@ def test_no_derivative_exceeds_its_bound(name: str) -> None:
                 for c in (1, -1):
                     at = q + coarse * (a * np.eye(6)[i] + b * np.eye(6)[j] + c * np.eye(6)[k])
                     total += a * b * c * chain.joint_inertia(at)
-        # a mean of third derivatives over a small box, so that the bound holds for it as well
+        # the difference is a mean of third derivatives over a small box, and so has the same bound
         assert (np.abs(total / (2 * coarse) ** 3).max(axis=0) <= D3[i, j, k] + DIFFERENCE).all()
 
 

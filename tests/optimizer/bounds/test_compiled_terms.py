@@ -1,5 +1,4 @@
-"""The terms of dual bounds by the C library against those by numpy, and against their
-definitions."""
+"""The terms of dual bounds in the C library, against numpy and their definitions."""
 
 from __future__ import annotations
 
@@ -133,7 +132,7 @@ def test_an_arm_of_two_joints_has_none_beside_the_grid() -> None:
 
 
 def test_deviation_of_cells() -> None:
-    """The corner that is farthest from the mean, and the curvature between."""
+    """The deviation is the farthest corner's distance from the mean, plus the curvature in between."""
     rng = np.random.default_rng(1)
     cells = GridCells((np.array([-0.5, -0.1, 0.2]), np.array([-0.3, 0.0, 0.1, 0.7])))
     value, mean = rng.normal(size=(2, 2, 12, 5)), rng.normal(size=(2, 5))
@@ -166,7 +165,7 @@ def test_points_that_are_needed_are_the_corners_of_cells_within_the_boxes() -> N
         reached[step : step + 2] |= corner
     assert (needed == reached).all()
     assert needed[:, cells.centre].all()
-    # every position of a box is in a cell that counts
+    # every position in a box belongs to a cell in use
     for step, box in enumerate(half):
         at = np.random.default_rng(step).uniform(-box, box, (200, 2))
         inside = ((low <= at[:, None]) & (at[:, None] <= high)).all(axis=2)

@@ -1,4 +1,4 @@
-"""The dual bound and its terms: no motion whose duration is in its interval spends less."""
+"""The dual bound and its terms: no motion with a duration in the interval needs less energy."""
 
 from __future__ import annotations
 
@@ -77,8 +77,9 @@ def dual_of(
 def around(
     task: PreparedProblem, start: Array, goal: Array, rng: np.random.Generator, noise: float = 1.0
 ) -> Reference:
-    """A bent path, and multipliers near what holding it takes, with `noise` of that size, of some
-    of the joints.
+    """A bent path with multipliers for some joints.
+
+    The multipliers are the holding torques plus random errors in proportion to `noise`.
     """
     share = np.linspace(0, 1, STEPS + 1)[:, None]
     x = start + share * (goal - start) + 0.1 * rng.normal(size=6) * share * (1 - share)
@@ -129,8 +130,10 @@ def test_no_motion_spends_less(name: str) -> None:
 def tangent_energy(
     torques: Torques, dual: DualBound, moved: Moved, multipliers: Array, weights: Weights
 ) -> float:
-    """Energy of a motion with the copper loss as its tangent at the multipliers, times their
-    factor, which is less than it: what the proof bounds."""
+    """Energy of a motion with its copper loss linearised at the scaled multipliers.
+
+    This linear energy is below the true energy; the proof bounds it.
+    """
     law, (t, q, v, a, each) = torques.task.arm.friction_law, moved
     dry, at = law.torque(v), np.linspace(0, 1, len(multipliers))
     tau = torques(q, v, a) + dry
@@ -143,7 +146,7 @@ def tangent_energy(
 
 
 def reference_along(torques: Torques, moved: Moved, steps: int) -> Reference:
-    """A path near a motion's, and multipliers near its torques that are linear in time."""
+    """A path near the motion's, with linear multipliers in time near the motion's torques."""
     t, q, v, a, _ = moved
     at, basis = np.linspace(0, 1, steps + 1), np.column_stack([np.ones_like(t), t / t[-1]])
     x = np.column_stack([np.interp(at, t / t[-1], each) for each in q.T])
@@ -156,8 +159,9 @@ def reference_along(torques: Torques, moved: Moved, steps: int) -> Reference:
 
 @pytest.mark.parametrize("name", long_but(("much copper",), NAMES))
 def test_any_multipliers_bound_the_linear_energy(name: str) -> None:
-    """Of motions near the path, so that little but the proof's own losses is between them and the
-    bound.
+    """The bound is below the linearised energy for any multipliers.
+
+    The motions stay near the path, so only the losses of the proof separate energy and bound.
     """
     task, rng = asked(name), np.random.default_rng(len(name))
     torques, seen, near = Torques(task), 0, 0
@@ -192,8 +196,10 @@ def test_any_multipliers_bound_the_linear_energy(name: str) -> None:
 
 
 def test_nor_do_the_best_motions_break_it() -> None:
-    """With multipliers along their torques and against them, where momentum is worth as much as all
-    other losses.
+    """The bound is below the energy of optimised motions.
+
+    The multipliers point along and against the motion's torques, and the momentum term is as large
+    as all other losses.
     """
     torques, closest = Torques(problem()), np.inf
     for start, goal in ((START, START + 0.8 * np.eye(6)[0]), (START, GOAL), (GOAL, START)):
@@ -217,8 +223,9 @@ def test_nor_do_the_best_motions_break_it() -> None:
     "name", long_but(("as it comes",), ("as it comes", "loaded and tilted", "slow limits"))
 )
 def test_many_cells_hold_what_their_durations_spend(name: str) -> None:
-    """Cells that share boxes, path and multipliers, narrow and wide, around motions of durations in
-    any of them.
+    """The bounds of many cells are below the energies of all motions with durations in the cells.
+
+    The cells share boxes, path and multipliers, and some are narrow, some wide.
     """
     task = problem(objective="electrical", duration_max=500.0, **CONDITIONS[name])
     torques, rng = Torques(task), np.random.default_rng(6)
@@ -251,9 +258,11 @@ def test_many_cells_hold_what_their_durations_spend(name: str) -> None:
 
 
 def test_a_cell_of_durations_is_below_each_of_them() -> None:
-    """The bound of an interval of durations is hardly above those of single durations in it: it is
-    for all of them. Nor is that of a narrow one far below. Multipliers of either sign grow and
-    fall."""
+    """The bound of an interval of durations is below the bound at every duration inside.
+
+    The bound of a narrow interval is also close to these bounds. Multipliers of both signs grow and
+    decay in time.
+    """
     task = PreparedProblem.of(problem())
     rng = np.random.default_rng(7)
     for k, (start, goal) in enumerate(zip(*ends(3, 6), strict=True)):
@@ -316,8 +325,11 @@ def test_the_conjugate_allows_for_the_load() -> None:
 
 
 def test_shaft_and_copper_are_above_their_linear_bound_under_load() -> None:
-    """The inequality of `dual_bound` under **Load** at random states, whichever way friction acts
-    on the motor; that of unloaded joints alone would be broken."""
+    """Under load, shaft work plus copper loss is above the linear bound of `dual_bound`, **Load**.
+
+    The states are random and friction acts on the motor in both directions. The bound for unloaded
+    joints fails here.
+    """
     rng, count = np.random.default_rng(4), 20_000
     law, limits, rotor = ROBOT.friction, ROBOT.limits, ROBOT.drives.rotor_inertia
     loss = ROBOT.drives.copper / ROBOT.drives.torque_constant**2

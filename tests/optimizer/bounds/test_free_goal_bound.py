@@ -1,6 +1,4 @@
-"""The lower bound on motions to a goal whose orientation is free in part, against configurations
-that reach it.
-"""
+"""The lower bound for goals with a partly free orientation, against sampled goal configurations."""
 
 from __future__ import annotations
 
@@ -91,9 +89,7 @@ def test_the_bound_holds_for_the_whole_family(half_angle: float, condition: str)
 @pytest.mark.parametrize("nq", long_but((2, 4, 7), (2, 3, 4, 5, 7)))
 @pytest.mark.parametrize("given", [{}, {"objective": "mechanical", "duration_max": 5.0}], ids=str)
 def test_the_bound_holds_for_any_chain(nq: int, given: dict[str, Any]) -> None:
-    """It is below the bound of a configuration that reaches the pose, also for chains without inner
-    joints.
-    """
+    """The bound is below sampled configurations for any chain, also without inner joints."""
     robot, rng = serial_chain(nq), np.random.default_rng(nq)
     for half_angle in (0.0, 0.3, np.pi):
         start, goal = rng.uniform(-3, 3, (2, nq))
@@ -134,8 +130,9 @@ def test_the_bound_tells_far_from_near() -> None:
 def test_many_starts_are_bounded_together(
     most: int, alone: int, rounds: int, rounds_at_goal: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also more starts than can have fine boxes at first: the bound of all is no higher than that
-    of any.
+    """The bound of many starts is at most the bound of any single start.
+
+    There are more starts than the budget of fine boxes covers at first.
     """
     monkeypatch.setattr(free_goal_bound, "POSE_FAMILY", replace(POSE_FAMILY, most_first_boxes=most))
     rng = np.random.default_rng(6)
@@ -167,8 +164,10 @@ def test_the_rim_of_the_tools_cone_is_covered() -> None:
 
 @pytest.mark.long
 def test_more_boxes_are_halved_where_the_bound_is_far_from_the_energy() -> None:
-    """The bound reaches nine tenths of an energy that few rounds leave it far below; what is near
-    ends after a few.
+    """The refinement halves more boxes while the bound is far below the energy.
+
+    Few rounds leave the bound far below; more rounds reach nine tenths. A bound near the energy
+    stops the refinement early.
     """
     made = PreparedProblem.of(problem(HOME, GOAL))
     pose = ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])

@@ -1,6 +1,4 @@
-"""The closed-form bound with the copper loss of holding: no motion spends less, whatever the
-multipliers and boxes.
-"""
+"""The closed-form bound with the copper loss of holding, for any multipliers and boxes."""
 
 from __future__ import annotations
 
@@ -48,7 +46,7 @@ def asked(name: str) -> Problem:
 
 
 def box_about(goal: Array, size: float, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Corners of a box of that greatest side that holds a goal, anywhere in it."""
+    """Corners of a box with the given greatest side and with the goal at a random place inside."""
     side = size * rng.random(len(goal))
     low = goal - rng.random(len(goal)) * side
     return low, low + side
@@ -58,8 +56,9 @@ def box_about(goal: Array, size: float, rng: np.random.Generator) -> tuple[Array
     "name", long_but(("as it comes", "loaded and tilted", "much copper"), NAMES)
 )
 def test_no_motion_spends_less(name: str) -> None:
-    """Straight and bent motions of every duration into boxes around their goals, none of them and
-    small and large.
+    """The bound is below every motion into boxes of size zero, small and large around the goals.
+
+    The motions are straight and bent, with many durations.
     """
     task, rng = asked(name), np.random.default_rng(len(name))
     torques = Torques(task)
@@ -92,8 +91,9 @@ Sampled = tuple[Array, Array, Array, Array, Array, float]
 def many_motions(
     task: Problem, start: Array, goal: Array, rng: np.random.Generator
 ) -> Iterator[Sampled]:
-    """Motions within the limits: the fastest, slowed a little and much, and some that leave the
-    line by half waves.
+    """Motions within the limits: the fastest, slowed and strongly slowed ones, and wavy ones.
+
+    The wavy motions leave the straight line by half waves.
     """
     least = max(float(shortest_duration(goal - start, task.arm.active_limits)), DURATIONS.least)
     for stretch in (1.0, 1.1, 1.5, 4.0):
@@ -121,8 +121,11 @@ def many_motions(
 
 @pytest.mark.parametrize("name", long_but(("uneven copper",), NAMES))
 def test_any_multipliers_bound_the_linear_energy(name: str) -> None:
-    """With the copper loss as its tangent at the multipliers, which is less than it: what the proof
-    says. Some of the multipliers are those of holding, and some motions are near the best."""
+    """The bound is below the energy with the copper loss linearised at any multipliers.
+
+    The linearised energy is below the true energy. Some multipliers are the holding torques, and
+    some motions come near the bound.
+    """
     task, rng = asked(name), np.random.default_rng(len(name))
     torques = Torques(task)
     seen, near = 0, 0
@@ -135,8 +138,10 @@ def test_any_multipliers_bound_the_linear_energy(name: str) -> None:
 
 
 def test_a_free_joint_comes_near_the_linear_energy() -> None:
-    """The first joint alone, without gravity, as fast as limits on its speed let it: nothing is
-    lost but at rest, where friction may help to hold."""
+    """For one joint without gravity at its speed limit, the bound nearly equals the linear energy.
+
+    The only gap is at rest, as friction may help to hold the joint.
+    """
     rng, first, ratios = np.random.default_rng(5), np.eye(6)[0], list[float]()
     for speed in (0.8, 1.5, 3.0):
         torques = Torques(problem(gravity=[0, 0, 0], limits=limits(v_max=speed)))
@@ -150,8 +155,7 @@ def test_a_free_joint_comes_near_the_linear_energy() -> None:
 def linear_ratios(
     torques: Torques, start: Array, goal: Array, joints: Array, rng: np.random.Generator
 ) -> Iterator[float]:
-    """Bounds with multipliers of some joints (nq,), over the energies of motions, of which the
-    copper loss is taken as its tangent."""
+    """Ratios of bounds to linearised energies of motions, with multipliers for some joints (nq,)."""
     prepared = torques.task
     task, law, holding = prepared.problem, prepared.arm.friction_law, HoldingCells.of(prepared)
     assert holding is not None
@@ -159,7 +163,7 @@ def linear_ratios(
     base = task.arm.base_power + float(task.arm.drives.inverter_constant.sum())
     gain = prepared.potential(goal) - prepared.potential(start)
     net = NetEnergy.for_motions(task.arm, (goal - start)[None], np.array([gain]))
-    # the line to a goal that is nearer in every joint
+    # a line to a goal with a smaller displacement in every joint
     side = rng.random(6) * np.minimum(WIDE, np.abs(goal - start)) * (rng.random() < 0.5)
     nearest = goal - np.sign(goal - start) * side
     line = Line.of(holding.bound.chain, start[None], (nearest - start)[None])

@@ -27,8 +27,7 @@ from joulepath.optimizer.search.baselines import guesses, motion_energy
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, changed, fixed, limits, problem
 from tests.selection import long_but
 
-# relative; energies are sums over samples, and a true bound may lie below a motion by nothing but
-# that
+# relative error of the sampled energies, the only amount by which a true bound may exceed them
 QUADRATURE = 1e-4
 EXACT = (
     1e-9  # relative; closed forms, minimised to a millionth of an interval around a flat minimum
@@ -81,7 +80,7 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 
 
 class Torques:
-    """Compiled torques of a problem, whatever copy of the robot it has."""
+    """Compiled torques of a problem with any variant of the robot."""
 
     def __init__(self, task: Problem) -> None:
         compile_kernel(ROBOT)
@@ -104,8 +103,9 @@ def ends(seed: int, count: int = MOVES) -> tuple[Array, Array]:
 def motions(
     task: Problem, start: Array, goal: Array, torques: Torques, seed: int
 ) -> Iterator[tuple[float, Energy]]:
-    """Durations and energies of motions that hold the limits on speed, acceleration and jerk:
-    straight and bent.
+    """Durations and energies of straight and bent motions within the limits.
+
+    The limits are on speed, acceleration and jerk.
     """
     own = task.arm.active_limits
     least = max(float(shortest_duration(goal - start, own)), DURATIONS.least)
@@ -158,8 +158,7 @@ def test_no_motion_spends_less(name: str) -> None:
         best = np.inf
         for duration, energy in motions(task, start[k], goal[k], torques, k):
             total = energy.electrical.total
-            # energies may be near zero, or below it: the rounding is of what they are the
-            # difference of
+            # the total is a difference of larger terms, so its rounding error scales with the terms
             slack = QUADRATURE * (abs(total) + energy.electrical.braking)
             assert duration >= shortest[k] * (1 - 1e-9)
             assert electrical[k] <= total + slack
@@ -179,9 +178,7 @@ def test_no_motion_spends_less(name: str) -> None:
 
 @pytest.mark.parametrize("law", long_but(("curved",), ROBOT.friction_laws))
 def test_no_answer_spends_less(law: str) -> None:
-    """Nor do motions that the optimiser finds; half of them are no further above than a third of
-    themselves.
-    """
+    """The bound is also below optimised motions, with a median gap of less than a third."""
     gaps = []
     for start, goal in zip(*ends(99, 8), strict=True):
         if np.array_equal(start, goal):
@@ -193,8 +190,9 @@ def test_no_answer_spends_less(law: str) -> None:
 
 
 def test_a_bound_may_be_below_zero_where_energy_comes_back() -> None:
-    """Lowering 5 kg with an arm that idles for nothing, hardly rubs, and feeds all of it back: the
-    bus gains.
+    """Under full regeneration, a falling load may charge the bus, and the bound is negative too.
+
+    The arm lowers 5 kg with little idle power and little friction.
     """
     smooth = replace(
         ROBOT.friction,
@@ -217,7 +215,7 @@ def test_a_bound_may_be_below_zero_where_energy_comes_back() -> None:
 
 
 def test_without_regeneration_nothing_is_below_zero() -> None:
-    """What is drawn is never negative, however far the load drops."""
+    """Without regeneration, the drawn energy is never negative, however far the load drops."""
     task = problem(robot=robot(idle=0.5), payload=PAYLOAD)
     start, goal = ends(5)
     ours, _ = bound(Torques(task), start, goal)
@@ -227,8 +225,9 @@ def test_without_regeneration_nothing_is_below_zero() -> None:
 @pytest.mark.parametrize("law", list(ROBOT.friction_laws))
 @pytest.mark.parametrize("speed", [0.02, 0.2, 2.0])
 def test_the_bound_is_reached_where_only_friction_costs(law: str, speed: float) -> None:
-    """A weightless joint that cruises in an arm without copper loss, in its shortest time: nothing
-    is left to save.
+    """The bound is tight for a motion whose only loss is friction.
+
+    A weightless joint without copper loss cruises for the shortest possible time.
     """
     lossless = robot(idle=1.0, drives=replace(ROBOT.drives, copper=np.full(6, 1e-9)))
     task = problem(gravity=[0, 0, 0], robot=lossless, friction=law, limits=limits(v_max=speed))
@@ -241,15 +240,15 @@ def test_the_bound_is_reached_where_only_friction_costs(law: str, speed: float) 
     )
     ours, _ = bound(torques, start[None], goal[None], **fixed(least * (1 + 1e-9)))
     share = ours[0] / (energy.electrical.total - energy.electrical.braking)
-    # while it speeds up the bound allows for no jerk below half its speed, and at 2 rad/s that is
-    # much of the way
+    # the bound ignores the jerk limit below half the speed, a large part of the motion at 2 rad/s
     assert (0.95 if speed > 1 else 0.99) < share <= 1 + QUADRATURE
 
 
 @pytest.mark.parametrize("share", [1.0, 3.0])
 def test_the_copper_loss_of_friction_counts(share: float) -> None:
-    """A weightless joint that cruises against friction: the bound has most of its copper loss,
-    whatever it is.
+    """The bound contains most of the copper loss of friction, at any size of this loss.
+
+    A weightless joint cruises against friction.
     """
     drives = replace(ROBOT.drives, copper=share * ROBOT.drives.copper)
     task = problem(
@@ -283,8 +282,10 @@ def test_one_share_of_the_copper_loss_is_for_all_joints() -> None:
 
 
 def test_standing_still_costs_idling() -> None:
-    """No displacement: the idle power over the least duration, which is the one asked for or the
-    least that is planned."""
+    """Without displacement, the bound is the idle power over the least duration.
+
+    This is the requested duration, or the least duration of any plan.
+    """
     torques = Torques(problem())
     q = np.zeros((1, 6))
     assert bound(torques, q, q)[0][0] == pytest.approx(36.7 * DURATIONS.least, rel=1e-3)
@@ -299,9 +300,7 @@ def test_standing_still_costs_idling() -> None:
     ),
 )
 def test_the_bound_is_the_least_over_the_duration(name: str, pairs: int) -> None:
-    """Against bounds at two thousand fixed durations: none is lower, and the least of them is as
-    low.
-    """
+    """The bound is the minimum of the bounds at two thousand fixed durations."""
     torques = Torques(problem(**CONDITIONS[name]))
     start, goal = ends(7, pairs)
     free, shortest = bound(torques, start, goal)
@@ -319,7 +318,7 @@ def test_the_bound_is_the_least_over_the_duration(name: str, pairs: int) -> None
 
 @pytest.mark.parametrize("price", long_but([100.0], [-40.0, -36.0, -30.0, 100.0]))
 def test_the_bound_at_a_price_of_time_is_the_least_over_the_duration(price: float) -> None:
-    """Slow ways pay where time is cheap, the slowest where it is paid for."""
+    """Slow motions pay at a low price of time, the slowest one at a negative enough price."""
     torques, longest = Torques(problem(payload=PAYLOAD)), 90.0
     start, goal = ends(9, 3)
     gain = np.array(
@@ -342,8 +341,10 @@ def test_the_bound_at_a_price_of_time_is_the_least_over_the_duration(price: floa
 
 
 def test_duration_bounds_raise_the_bound() -> None:
-    """To the convex function's value at the nearer end of the interval, or to infinity where no
-    motion is that fast.
+    """A limit on the duration raises the bound.
+
+    The bound is the convex function's value at the nearer end of the allowed interval, or infinite
+    if no motion is fast enough.
     """
     torques = Torques(problem())
     start, goal = ends(8)

@@ -1,5 +1,6 @@
-"""The lower bound where an inverse kinematics may miss branches: no configuration that reaches a
-pose is below it.
+"""The lower bound for poses with an incomplete inverse kinematics.
+
+The bound is below every configuration of the pose, including branches missed by the solver.
 """
 
 from __future__ import annotations
@@ -28,12 +29,12 @@ CHAIN = Chain.of(GEN3.model)
 # of an attack
 PARTICLES = 80
 STEPS = 25
-# what a configuration misses its pose by, at most [m, rad]
+# largest pose error of a configuration [m, rad]
 EXACT = 1e-11
 # relative
 ROUNDING = 1e-12
-# a bound over a pose is nearly that of its best configuration, but where the wrist may be near a
-# singularity: 0.35 mm, by which the arm nearby is off, leaves two joints free there
+# least ratio of the bound over a pose to the bound of its best configuration; near a singularity of
+# the wrist the nearby arm, 0.35 mm off, leaves two joints free
 NEAR = 0.95
 
 
@@ -42,7 +43,7 @@ def candidates(prepared: PreparedProblem) -> list[Candidate]:
 
 
 def whole(start: Any, goal: Any, **given: Any) -> float:
-    """The bound of what may be missed."""
+    """The bound over all configurations possibly missed."""
     prepared = PreparedProblem.of(asked(GEN3, start, goal, **given))
     assert not all_branches_known(prepared.problem)
     return bound_of_missed_branches(prepared, candidates(prepared))
@@ -54,7 +55,7 @@ def least(starts: Array, goals: Array, **given: Any) -> float:
 
 
 def of_pairs(starts: Array, goals: Array, **given: Any) -> Array:
-    """Bounds of pairs of configurations (n, 7), with the full turns that bring joints nearest."""
+    """Bounds of pairs of configurations (n, 7), with the full turns of least displacement."""
     turned = nearest_turn(goals, starts)
     goals = np.where(within_limits(turned), turned, goals)
     prepared = PreparedProblem.of(asked(GEN3, starts[0], starts[0], **given))
@@ -69,8 +70,11 @@ def within_limits(q: Array) -> Array:
 
 
 def attacked(start: Array, goal: Array, seed: int) -> float:
-    """The least bound to any configuration of a pose that is found without curves: Newton's method
-    from random joint positions, then random steps along the self-motion that lower the bound."""
+    """The least bound to any configuration of a pose, found without tracing curves.
+
+    Newton's method starts from random joint positions; random steps along the self-motion then
+    lower the bound.
+    """
     rng, T = np.random.default_rng(seed), CHAIN.flange(goal[None])[0]
     q = np.vstack([goal, solved(CHAIN, rng.uniform(-np.pi, np.pi, (PARTICLES, 7)), T)[0]])
     best = np.full(len(q), np.inf)
@@ -113,7 +117,7 @@ def test_no_configuration_of_the_pose_is_below(given: dict[str, Any]) -> None:
 def test_an_attack_without_curves_finds_none_below(
     count: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without the copper loss of holding, which the bound of a pair does not contain."""
+    """No attack gets below the bound, which excludes the copper loss of holding."""
     monkeypatch.setattr(HoldingCells, "of", lambda prepared: None)
     ratios = []
     for k, (start, goal) in enumerate(tasks("gen3", count)):
@@ -129,8 +133,7 @@ def test_between_poses_and_among_several_targets() -> None:
     one, two = pose_of(GEN3, start), pose_of(GEN3, goal)
     each = [np.array(members(GEN3, q, 300, seed=80)) for q in (start, goal)]
     assert 0 < whole(one, two) <= least(*each) * (1 + ROUNDING)
-    # joint positions beside a pose are candidates of their own: what is missed is on the pose's
-    # sheets
+    # joint positions in the list are separate candidates: only sheets of the pose may be missed
     mixed = whole(AnyOf((start, pose_of(GEN3, other))), two)
     assert mixed <= min(whole(start, two), whole(pose_of(GEN3, other), two)) * (1 + ROUNDING)
     assert whole(start, AnyOf((other, two))) <= whole(start, two) * (1 + ROUNDING)
@@ -138,7 +141,7 @@ def test_between_poses_and_among_several_targets() -> None:
 
 @pytest.mark.long
 def test_no_configuration_on_a_singularity_is_below() -> None:
-    """Given by their joints: what traces curves may well miss them."""
+    """Configurations on a singularity, given by their joints, are easily missed by curve tracing."""
     rng, (start, _) = np.random.default_rng(9), tasks("gen3", 1)[0]
     compared = 0
     for _ in range(8):

@@ -37,7 +37,7 @@ NEAR = 0.6
 
 
 def beside_fifth(by: float) -> Robot:
-    """UR5e whose sixth axis passes the fifth at a distance [m]."""
+    """UR5e with a given distance [m] between its fifth and sixth axis."""
     points, T_zero = UR_AXES.points.copy(), UR_AXES.T_zero.copy()
     shift = by * np.cross(UR_AXES.directions[4], UR_AXES.directions[5])
     points[5] += shift
@@ -84,7 +84,7 @@ def test_every_configuration_is_in_a_box(tool: str, count: int) -> None:
     relations = ("square", "parallel", "square meeting", "oblique", "square")
     robots = [*COMMON, *(robot_of(random_axes(relations, rng)) for _ in range(3))]
     for robot in robots if count > 1 else robots[2:4]:
-        # half a turn to either side, so that each configuration has one representative
+        # half a turn to either side: one representative per configuration
         limits = replace(robot.limits, q_min=np.full(6, -np.pi), q_max=np.full(6, np.pi))
         arm = Arm(robot=replace(robot, limits=limits), T_flange_tcp=T)
         for k in range(count):
@@ -115,7 +115,7 @@ def problem_between(robot: Robot, rng: np.random.Generator) -> Problem:
 
 
 def least_of_pairs(problem: Problem, seed: int) -> float:
-    """Least bound of any pair of configurations, with the full turns that bring joints nearest."""
+    """Least bound of any pair of configurations, with the full turns of least displacement."""
     prepared = PreparedProblem.of(problem)
     poses: Any = (problem.start, problem.goal)
     sides = [configurations(problem.arm, pose, seed) for pose in poses]
@@ -149,7 +149,7 @@ def test_no_pair_of_configurations_is_below(robot: Robot) -> None:
         both = bound_of_missed_branches(prepared, known(prepared))
         least = least_of_pairs(problem, k)
         assert 0 <= both <= least * (1 + ROUNDING)
-        # an arm that falls far may need no energy at all
+        # an arm with a long fall may need no energy at all
         if least > 0:
             ratios.append(both / least)
     assert np.median(ratios) > NEAR

@@ -1,5 +1,6 @@
-"""Bounds raised by the copper loss of holding and by the dual of the motion: where it pays, and
-never above an energy.
+"""Bounds raised by the copper loss of holding and by the dual of the motion.
+
+The bounds rise only as needed, and never above an energy.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from tests.selection import long_but
 # the arm stretched out sideways at both ends: it holds its weight all the way
 OUT = np.array([0.0, -0.3, 0.4, -1.5, -1.57, 0.0])
 TURNED = OUT + np.array([1.2, 0.1, -0.1, 0.0, 0.0, 0.5])
-# of a heavy arm's gap that is to be gone at least
+# least share of a heavy arm's gap to be closed
 SHARE = 0.3
 # rounding
 AGAIN = 1e-9
@@ -66,9 +67,7 @@ def test_a_heavy_arm_that_holds_its_weight_gains_much() -> None:
 
 
 def test_the_lowest_are_raised_until_the_least_is() -> None:
-    """No bound falls or goes beyond the target, and the least one is that of a pair that was
-    raised.
-    """
+    """The least bounds are raised, up to the target, until a raised pair has the least bound."""
     made, found = bounded(problem(OUT, tcp_pose(TURNED)))
     energy = optimize(made.problem).energy.electrical.total
     before = {each: each.lower_bound for each in found}
@@ -87,8 +86,10 @@ def test_the_lowest_are_raised_until_the_least_is() -> None:
 
 @pytest.mark.parametrize("bound", long_but(["normal"], ["normal", "tight"]))
 def test_turns_that_are_no_candidates_are_bounded_too(bound: str) -> None:
-    """Without full turns, a joint that has half a turn to go has about as far the other way
-    around."""
+    """Full turns outside the candidates have bounds too.
+
+    A joint with half a turn to go has about the same way in the other direction.
+    """
     arm = problem(robot=load_robot("ur20")).arm
     goal = TURNED + (np.pi - HALF_TURN_LESS - TURNED[5]) * np.eye(6)[5]
     asked = problem(
@@ -169,9 +170,7 @@ def test_it_is_between_the_plain_bound_and_the_energy(name: str) -> None:
 
 
 def test_motions_of_other_durations_spend_no_less() -> None:
-    """The least energy at fixed durations from the best one on is not below the tight bound for all
-    of them.
-    """
+    """The tight bound for all longer durations is below the least energies at fixed durations."""
     free = optimize(problem(bound="tight"))
     for factor in (1.0, 1.1, 1.3, 1.7):
         found = optimize(problem(**fixed(factor * free.duration)))

@@ -1,6 +1,4 @@
-"""The bound on travel: over the parts of any motion from rest to rest, its sum is never above what
-the motion draws.
-"""
+"""The bound on travel: its sum over the parts of a rest-to-rest motion is at most the energy drawn."""
 
 from __future__ import annotations
 
@@ -20,9 +18,9 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, problem
 from tests.selection import long_but
 
-# relative; energies are quadratures, and a true bound may lie below a motion by nothing but that
+# relative error of the sampled energies, the only amount by which a true bound may exceed them
 QUADRATURE = 1e-4
-# parts into which a motion is cut
+# numbers of parts of a motion
 PARTS = (2, 3, 5, 40)
 
 
@@ -44,7 +42,7 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 
 
 def bounds(prepared: PreparedProblem, q: Array) -> Array:
-    """Bounds on the travel from each of the configurations q (k, nq) to the next."""
+    """Bounds on the travel between consecutive configurations q (k, nq)."""
     gains = np.diff([prepared.potential(each) for each in q])
     return travel_bounds(prepared, np.diff(q, axis=0), gains)
 
@@ -68,7 +66,7 @@ def cuts(rng: np.random.Generator, motion: Spline) -> list[Array]:
 
 @pytest.mark.parametrize("name", long_but(("loaded and tilted",), CONDITIONS))
 def test_no_motion_draws_less_however_it_is_cut(name: str) -> None:
-    """Random motions, and those of least energy, which are the hardest to stay below."""
+    """The bound holds for random motions and for optimal motions, the hardest case."""
     prepared, rng, nearest = (
         PreparedProblem.of(problem(**CONDITIONS[name])),
         np.random.default_rng(len(name)),
@@ -105,9 +103,12 @@ def test_bounds_from_rest_to_rest_do_not_hold_where_the_arm_passes() -> None:
 
 
 def test_that_nothing_is_drawn_below_zero_does_not_hold_part_by_part() -> None:
-    """A load that swings from one side to the other: what the fall gives, the rise draws less.
-    Parts of at least zero add up to many times what the swing draws; the travel's own bounds, some
-    of them below zero, do not."""
+    """Bounds of zero for single parts do not add up to a bound of the whole motion.
+
+    A load swings from one side to the other, and the energy of the fall feeds the rise. Clipping
+    the bound of every part at zero exceeds the energy of the swing many times; the travel bounds,
+    some of them negative, stay below.
+    """
     smooth = replace(
         ROBOT.friction,
         coulomb=ROBOT.friction.coulomb / 50,

@@ -1,5 +1,6 @@
-"""The least chain of configurations, against every chain: of given costs, and of costs that a lazy
-search asks for.
+"""The least chain of configurations, against brute force over every chain.
+
+The costs are given, or requested by a lazy search.
 """
 
 from __future__ import annotations
@@ -37,7 +38,10 @@ def cost_of(costs: list[Array], nodes: list[int]) -> float:
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("seed", range(20))
 def test_it_is_the_least_of_all_while_costs_rise_and_fall(seed: int, closed: bool) -> None:
-    """Some legs have no motion. Costs rise as legs are solved; one that falls is announced."""
+    """The search finds the least chain while costs rise and fall.
+
+    Some legs have no motion. Costs rise as legs are solved; a falling cost is announced.
+    """
     rng = np.random.default_rng(seed)
     sizes = rng.integers(1, 4, 4).tolist()
     sizes = [*sizes, sizes[0] if closed else int(rng.integers(1, 4))]
@@ -81,7 +85,10 @@ def test_no_chain_has_no_nodes() -> None:
 
 @pytest.mark.parametrize("closed", [True, False])
 def test_a_cost_that_falls_from_infinity_opens_chains(closed: bool) -> None:
-    """A search that ran out of time counts a move as impossible, and may find its motion later."""
+    """A leg without a motion has infinite cost and may get a finite cost later.
+
+    A search stopped by its deadline counts a leg as impossible; a later search may find a motion.
+    """
     costs = [np.array([[1.0, np.inf], [np.inf, np.inf]]), np.array([[2.0, np.inf], [0.1, 9.0]])]
     chain = LeastChain(costs, closed)
     assert chain.find() == (3.0, [0, 0, 0])
@@ -100,8 +107,9 @@ def layer(count: int) -> Any:
 
 
 def leg(kind: Array, bound: Array) -> Leg:
-    """A leg of given kinds (s, g), whose first pair is the one farthest from the limits, with
-    bounds (k,) [J].
+    """A leg with given kinds (s, g) and bounds (k,) [J].
+
+    The first pair of every kind is the farthest from the limits.
     """
     limits = SimpleNamespace(q_min=np.array([-RANGE]), q_max=np.array([RANGE]))
     prepared: Any = SimpleNamespace(arm=SimpleNamespace(active_limits=limits))
@@ -122,8 +130,9 @@ def leg(kind: Array, bound: Array) -> Leg:
 
 
 class Known(LazySearch):
-    """A search whose pairs need the `energies` [J] of each leg (s, g); those `near` a limit (s, g)
-    come to it.
+    """A search with known `energies` [J] for the pairs (s, g) of every leg.
+
+    The pairs in `near` (s, g) come close to a limit.
     """
 
     def __init__(self, legs: list[Leg], energies: list[Array], near: list[Array]) -> None:
@@ -144,13 +153,13 @@ class Known(LazySearch):
 
 
 def spline(q: float) -> Spline:
-    """A motion that comes to q [rad]."""
+    """A motion with q as its goal [rad]."""
     knots = np.repeat([0.0, 1.0], 6)
     return Spline(5, knots, np.array([0.0, 0.0, q, q, 0.0, 0.0])[:, None])
 
 
 class Late(Known):
-    """A search in which every pair takes longer than its share of the time."""
+    """A search with every pair exceeding its share of the time."""
 
     def attempt(self, k: int, s: int, g: int) -> float | None:
         return self.out_of_time()
@@ -159,8 +168,9 @@ class Late(Known):
 @pytest.mark.parametrize("share", [0.0, 0.4])
 @pytest.mark.parametrize("seed", range(25))
 def test_the_least_chain_is_that_of_all_pairs_solved(seed: int, share: float) -> None:
-    """Bounds below what every kind needs; this share of the pairs needs more, for a joint's range
-    is in the way.
+    """The search finds the least chain while every bound is below the energy of its kind.
+
+    A given share of the pairs is near a joint limit and needs more than its kind.
     """
     rng = np.random.default_rng(seed)
     legs, energies, near, own = list[Leg](), list[Array](), list[Array](), list[Array]()
@@ -175,13 +185,13 @@ def test_the_least_chain_is_that_of_all_pairs_solved(seed: int, share: float) ->
         energies.append(own[-1] + np.where(near[-1], rng.uniform(0, 5, kind.shape), 0.0))
     search = Known(legs, energies, near)
     found = search.cost(search.explore())
-    # a pair near a limit that was not tried weighs what its kind does: `CycleSearch` finishes it,
-    # and looks again
+    # an unsolved pair near a limit has the cost of its kind; `CycleSearch` solves and compares
+    # again
     assert least_of_pairs(own) - ROUNDING <= found <= least_of_pairs(energies) + ROUNDING
 
 
 def least_of_pairs(costs: list[Array]) -> float:
-    """The least sum of one cost of each matrix over all chains."""
+    """The least sum of matrix entries over all chains."""
     sizes = [costs[0].shape[0], *(cost.shape[1] for cost in costs)]
     chains = product(*(range(size) for size in sizes))
     return min(
@@ -191,7 +201,7 @@ def least_of_pairs(costs: list[Array]) -> float:
 
 
 def _first(kind: Array) -> Array:
-    """Which pairs (s, g) are the first of their kind."""
+    """Mask of the first pairs (s, g) of every kind."""
     first = np.zeros(kind.size, dtype=bool)
     first[np.unique(kind, return_index=True)[1]] = True
     return first.reshape(kind.shape)

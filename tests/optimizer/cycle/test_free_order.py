@@ -1,4 +1,4 @@
-"""Cycles whose order is free: the best order of all, and what restricts it."""
+"""Cycles with a free order of stops: the best order, and constraints on the order."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from tests.refusals import refusal_of
 from tests.selection import long_but
 
 ROUNDING = 1e-9
-# relative: optima that are reached in searches of their own
+# relative difference of optima from separate searches
 CONVERGED = 2e-3
-# readings of the clock after the deadline, as a share of it: those that find it passed, and what is
-# certified by then
+# readings of the clock after the deadline, as a share of the deadline: its checks, and the
+# certification of motions found so far
 OVERRUN = 0.05
 
 
 def inspection(seed: int, count: int, **given: Any) -> Cycle:
-    """A cycle at which nothing is carried, in a free order, without full turns."""
+    """A cycle without a payload, in free order and without full turns."""
     asked = pick_and_place(seed, count, windings=False)
     stops = [replace(stop, payload=None) for stop in asked.stops]
     return replace(asked, stops=stops, **{"order": FreeOrder()} | given)
@@ -185,8 +185,9 @@ def test_thirteen_stops_are_too_many() -> None:
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("seed", range(20))
 def test_the_least_tour_is_that_of_all_tours(seed: int, closed: bool) -> None:
-    """Random costs, some of them infinite, some groups before others; every tour through every node
-    as the peer.
+    """The least tour equals the least of all enumerated tours.
+
+    The costs are random and partly infinite, and some groups precede others.
     """
     rng = np.random.default_rng(seed)
     ends: dict[Any, Any] = {each: _some_ends(rng) for each in (None, 0, 1, 2, 3)}
@@ -201,7 +202,7 @@ def test_the_least_tour_is_that_of_all_tours(seed: int, closed: bool) -> None:
     }
     earlier: list[set[int]] = [set(), set(), {0}, set()] if seed % 2 else [set()] * 4
     tours = HeldKarp(ends, earlier, closed)
-    # costs that change between two questions are the new ones
+    # costs may change between two searches: the second one uses the new costs
     for _ in range(2):
         for (a, b), cost in blocks.items():
             if closed or b is not None:
@@ -212,7 +213,7 @@ def test_the_least_tour_is_that_of_all_tours(seed: int, closed: bool) -> None:
 
 
 def _some_ends(rng: np.random.Generator) -> Any:
-    """Ends of some nodes, several nodes for some of them."""
+    """Random indices of ends for a few nodes; several nodes may share an end."""
     return np.unique(np.sort(rng.integers(0, 3, rng.integers(1, 5))), return_inverse=True)[1]
 
 

@@ -1,4 +1,4 @@
-"""Cycles with stops, and with paths whose ends, leave the orientation of the tool free in part."""
+"""Cycles with a partly free tool orientation at stops and at ends of paths."""
 
 from __future__ import annotations
 
@@ -45,13 +45,12 @@ FROM = (0.7, -0.2, 0.2)  # ends of the seam in the base frame [m]
 TO = (0.7, 0.2, 0.2)
 # m, and of unit vectors: the tolerances of a path
 NEAR = 2e-3
-# of the deadline: what is certified after it has passed
+# certification after the deadline, as a share of the deadline
 OVERRUN = 0.1
 TILT = 0.3  # half angle of the cone at a stop [rad]
 ON_MANIFOLD = 1e-8  # largest error of a configuration at its pose [m, rad]
 EXACT = 1e-9  # rounding of joint positions [rad]
-# relative: by so much a cycle at given orientations may be better than one at chosen ones, which
-# are local optima
+# relative advantage of a cycle at given orientations over the answer, which is a local optimum
 CHOSEN = 1e-3
 # s: less than any motion takes
 FAR_TOO_SHORT = 1e-3
@@ -75,7 +74,7 @@ def seam(start: Any, goal: Any, **path: Any) -> Cycle:
 
 @pytest.fixture
 def few_angles(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fewer angles than a request has: each of them is a path to be solved."""
+    """Fewer angles than in a request, since every angle is one more path to solve."""
     turns = replace(tool_turns.TOOL_TURNS, angles=(0.0, 2.0), orientations=4)
     monkeypatch.setattr(tool_turns, "TOOL_TURNS", turns)
     settings = replace(free_orientations.FREE_ORIENTATIONS, steps_on_paths=(0.3,), steps=(0.3, 0.1))
@@ -158,7 +157,7 @@ def test_an_end_that_is_free_otherwise_names_its_field(
 
 
 def free_stops(**changes: Any) -> Cycle:
-    """A part that may be gripped at any angle, and put down with the tool tilted a little."""
+    """A part with any grip angle, put down with a slightly tilted tool."""
     pick = Stop(name="pick", target=ConeOrientedPose.about(down((0.5, -0.2, 0.1)), AXIS), dwell=0.2)
     cone = ConeOrientedPose(np.array([0.3, 0.4, 0.3]), AXIS, DOWN, TILT)
     place = Stop(name="place", target=cone, branch=BranchFilter(shoulder="right"))
@@ -191,8 +190,7 @@ def test_orientations_at_stops_are_chosen_for_the_whole_cycle(windings: bool) ->
     assert found.status == "feasible" and found.complete
     assert_reached(found, asked.arm, "pick", (0.5, -0.2, 0.1))
     assert_reached(found, asked.arm, "place", (0.3, 0.4, 0.3), TILT)
-    # cycles at orientations that are given, the attack: none is below the bound, and the answer is
-    # no worse
+    # attack by cycles at given orientations: none is below the bound or clearly below the answer
     rng = np.random.default_rng(3)
     for _ in range(2):
         turns = rng.uniform([-np.pi, -TILT / 2, -TILT / 2], [np.pi, TILT / 2, TILT / 2])
@@ -214,8 +212,9 @@ def test_orientations_at_stops_are_chosen_for_the_whole_cycle(windings: bool) ->
 @pytest.mark.long
 @pytest.mark.usefixtures("few_angles")
 def test_a_free_stop_has_lines_and_is_passed() -> None:
-    """Along the free axis, so that the outer end is a pose of the same kind; and a stop that the
-    arm passes.
+    """A free stop may have lines, and the arm may pass a free stop.
+
+    Lines along the free axis keep the kind of pose at the outer end.
     """
     asked = free_stops(closed=False)
     lift = Line(direction=np.array([0.0, 0.0, 1.0]), distance=0.05)
@@ -251,7 +250,7 @@ def test_the_poses_at_the_end_of_a_line_are_known_where_they_are_one() -> None:
         pose, Line(direction=across, distance=0.05, frame="base"), 1.0
     )
     assert beside is not None and beside.position == pytest.approx([0.55, -0.2, 0.1])
-    # where the direction turns with the tool, the outer end is anywhere on a circle
+    # a direction fixed to the tool turns along, so the outer ends form a circle
     assert stop_layers._shifted_pose(pose, Line(direction=across, distance=0.05), 1.0) is None
     tilted = replace(pose, half_angle=TILT)
     assert stop_layers._shifted_pose(tilted, Line(direction=up, distance=0.05), 1.0) is None
@@ -278,6 +277,6 @@ def test_without_time_for_full_turns_the_cycle_without_them_is_the_answer() -> N
     assert_true(asked, found)
     assert found.status == "feasible"
     assert_reached(found, asked.arm, "pick", (0.5, -0.2, 0.1))
-    # with nothing known, the refusal says that there was no time
+    # without a known cycle, the error is a passed deadline
     with pytest.raises(DeadlineExceeded):
         plan_cycle(replace(asked, deadline=FAR_TOO_SHORT))

@@ -1,4 +1,4 @@
-"""Cycles: the least of all chains, certified, and never above what choosing move by move gives."""
+"""Cycles: the best of all chains, certified, and at least as good as a choice move by move."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ from tests.selection import long_but
 
 # relative: sums of the same numbers in another order
 ROUNDING = 1e-9
-# relative: an optimum that is reached from the search's rough motion, and one from nothing
+# relative difference of two optima, from the search's rough motion and from scratch
 CONVERGED = 2e-3
 
 
 def assert_true(asked: Cycle, found: CycleSolution) -> None:
-    """What every cycle promises."""
+    """Check the promises of every cycle."""
     assert all(move.solution.certificate.valid for move in found.moves)
     assert found.joins < 1e-9
     electrical = found.energy.electrical
@@ -78,7 +78,7 @@ def assert_true(asked: Cycle, found: CycleSolution) -> None:
 
 
 def planned(asked: Cycle) -> CycleSolution:
-    """The answer to a cycle, with what every cycle promises."""
+    """The answer to a cycle, after a check of all promises."""
     found = plan_cycle(asked)
     assert_true(asked, found)
     return found
@@ -92,7 +92,10 @@ def energy_of(asked: Cycle, k: int, start: Array, goal: Array) -> float:
 
 @pytest.mark.parametrize("seed", long_but(range(1), range(100)))
 def test_it_is_the_least_of_all_chains(seed: int) -> None:
-    """Two or three stops with two or three branches each, every chain by `optimize`."""
+    """The answer is the best of all chains, with every chain solved by `optimize`.
+
+    The cycles have two or three stops with two or three branches.
+    """
     asked = pick_and_place(seed, 2 + seed % 2, windings=False)
     only = BranchFilter(elbow="up", wrist="no_flip" if seed % 2 else None)
     asked = replace(asked, stops=[replace(stop, branch=only, dwell=0.0) for stop in asked.stops])
@@ -155,8 +158,10 @@ def test_cycles_are_true_and_not_above_move_by_move(seed: int, count: int) -> No
     ],
 )
 def test_move_by_move_is_what_successive_calls_of_optimize_give(start: Array | Pose) -> None:
-    """From a pose, the first of them takes the configuration at the start that is best for
-    itself."""
+    """The move-by-move baseline equals successive calls of `optimize`.
+
+    From a pose, the first call also chooses the best configuration at the start for its own move.
+    """
     asked = pick_and_place(1, 3, start=start)
     found = plan_cycle(asked)
     q, total, visited = start, 0.0, list[Array]()
@@ -170,7 +175,7 @@ def test_move_by_move_is_what_successive_calls_of_optimize_give(start: Array | P
     assert greedy.electrical == pytest.approx(
         total, rel=0.01
     )  # either may take the other of two equal moves
-    # the shorter cycle waits, where the answer waits for least, until the longer one ends
+    # the shorter cycle waits at its cheapest stop until the end of the longer one
     wait = greedy.duration - found.duration
     powers = [
         float(holding_power(arm, Plant(arm).torques(q[None], *np.zeros((2, 1, len(q))))[0]))
@@ -204,8 +209,9 @@ def test_the_part_is_carried_where_it_is_and_held_while_the_arm_dwells() -> None
 @pytest.mark.long
 @pytest.mark.parametrize("others", [8])
 def test_a_redundant_arm_goes_round_with_a_bound_that_covers_all_postures(others: int) -> None:
-    """Its configurations are samples: never `optimal`, and what fixed postures need is above the
-    bound.
+    """The bound of a redundant arm covers all postures, not just the sampled ones.
+
+    The answer is never `optimal`, and fixed postures need more than the bound.
     """
     robot = load_robot("panda")
     q = np.array([[0.3, -0.4, 0.2, -2.0, 0.1, 1.8, 0.5], [-0.6, 0.2, 0.1, -1.7, -0.2, 2.0, 0.9]])
@@ -229,7 +235,7 @@ def test_a_redundant_arm_goes_round_with_a_bound_that_covers_all_postures(others
 
 
 def _member(ends: list[EndConfiguration], rng: np.random.Generator) -> Array:
-    """Any member of any self-motion that is within the limits."""
+    """A random member of the self-motions within the limits."""
     limits = load_robot("panda").limits
     while True:
         curve = ends[rng.integers(len(ends))].self_motion
@@ -242,8 +248,9 @@ def _member(ends: list[EndConfiguration], rng: np.random.Generator) -> Array:
 
 @pytest.mark.parametrize("readings", long_but([40, 1000], [40, 200, 1000, 4000]))
 def test_a_deadline_gives_the_best_cycle_so_far_or_says_so(readings: int) -> None:
-    """A clock that counts its readings passes the deadline anywhere; what comes out is certified
-    all the same.
+    """At a deadline, the result is the best certified cycle so far, or a clear refusal.
+
+    A clock with counted readings passes the deadline at many points of the search.
     """
     asked = replace(pick_and_place(1, 3, windings=False), deadline=float(readings))
     try:
@@ -272,8 +279,9 @@ def test_what_is_wrong_names_the_stop() -> None:
 
 
 def test_stops_that_no_chain_connects_are_named() -> None:
-    """Between two ranges of a joint that full turns would have to bridge there is no way without
-    windings.
+    """The error names the stops without a connecting chain.
+
+    Without windings, no motion leads from one range of a joint to another a full turn away.
     """
     narrow = replace(ROBOT.limits, v_max=np.full(6, 1e-2))
     arm = Arm(robot=ROBOT, collisions=False, limits=narrow)

@@ -1,6 +1,4 @@
-"""Cycles that pass through stops: never worse than stopping there, at every pass, above a bound
-that holds.
-"""
+"""Cycles with passes: no worse than with stops, true to every pass, and above a valid bound."""
 
 from __future__ import annotations
 
@@ -41,10 +39,10 @@ from tests.selection import long_but
 optimize_cycle_module = importlib.import_module("joulepath.optimizer.plan_cycle")
 
 ROUNDING = 1e-9
-# relative; a motion's energy from panels that are as long as a share of it
+# relative error of a motion's energy, from panels with a length in proportion to the motion
 QUADRATURE = 2e-5
-# relative; two solves of one motion from different guesses, which may end in optima that differ by
-# as much
+# relative difference of two solves of one motion, from different guesses and perhaps to different
+# optima
 GUESSES = 5e-4
 ARM = Arm(robot=ROBOT, collisions=False)
 Q = [
@@ -58,7 +56,7 @@ Q = [
 
 
 def passing_cycle(seed: int, count: int, **given: Any) -> Cycle:
-    """A cycle over poses, of which all but the last are passed."""
+    """A cycle over poses with a stop at the last and passes at all others."""
     stops = [
         Stop(name=f"{k}", target=pose, via=k < count - 1)
         for k, pose in enumerate(poses(seed, count))
@@ -114,7 +112,7 @@ def test_every_pass_is_where_its_target_says_and_when_the_answer_says() -> None:
 
 
 def test_the_best_of_all_configurations_is_found() -> None:
-    """Two targets at each of two passes: every combination is solved by itself."""
+    """With two targets at two passes, the answer is the best of all separately solved combinations."""
     targets = [[q, q + np.array([0.3, -0.3, 0.3, 0, 0, 0])] for q in Q[:2]]
     stops = [
         Stop(name=f"{k}", target=AnyOf(tuple(each)), via=True) for k, each in enumerate(targets)
@@ -180,14 +178,17 @@ def test_in_a_given_time_it_is_not_worse_either(factor: float) -> None:
     if factor > 1:
         assert against(found)["stopping"] >= 0 and found.price_of_time < 0
     else:
-        # stopping takes longer than that
+        # the cycle with stops takes too long to compare
         assert "stopping" not in against(found) and found.price_of_time >= 0
 
 
 def test_what_stops_is_the_answer_where_the_search_ends_too_early(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Its motions are certified as those of a cycle that passes, and it saves nothing."""
+    """If the search ends too early, the answer is the cycle with stops.
+
+    Its motions have the certificates of a passing cycle, and its saving over `stopping` is zero.
+    """
 
     def ended(search: CycleSearch) -> Any:
         if search.cycle.has_passes:

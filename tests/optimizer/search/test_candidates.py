@@ -1,4 +1,4 @@
-"""Candidates, against counting them all; and which of them their ends rule out."""
+"""The candidates of a search equal a full enumeration; infeasible ends rule candidates out."""
 
 from __future__ import annotations
 
@@ -55,8 +55,9 @@ def candidates(task: Problem) -> list[Candidate]:
 
 
 def every_configuration(q: Array, task: Problem) -> list[Array]:
-    """Every branch of the pose at q with every combination of full turns inside the limits, by
-    trying them all.
+    """All configurations at the pose of q, by brute force.
+
+    Tries every branch with every combination of full turns inside the joint limits.
     """
     own, found = task.arm.active_limits, []
     for branch in inverse_kinematics_for(task.arm.robot).branches(tcp_pose(q).T):
@@ -67,7 +68,7 @@ def every_configuration(q: Array, task: Problem) -> list[Array]:
 
 
 def rounded(rows: list[Array]) -> set[tuple[float, ...]]:
-    """Rows of angles as a set: two that differ by rounding become one."""
+    """The rows of an array of angles as a set, in which equal rows up to rounding count once."""
     return {tuple((np.round(row, 5) + 0.0).tolist()) for row in rows}
 
 
@@ -83,7 +84,7 @@ def test_joints_to_joints_is_one_candidate() -> None:
 
 @pytest.mark.parametrize("own", [ROBOT.limits, NARROW], ids=["two turns", "one and a bit"])
 def test_windings_of_a_goal_are_complete(own: Any) -> None:
-    """From given joints: every branch with every full turn that the limits leave, each once."""
+    """Fixed start joints: the candidates are all branches with all allowed full turns, each once."""
     task = problem(goal=tcp_pose(GOAL), limits=own)
     found = [candidate.q_goal for candidate in candidates(task)]
     expected = every_configuration(GOAL, task)
@@ -101,7 +102,7 @@ def test_windings_of_a_start_are_complete() -> None:
 
 
 def test_without_windings_every_branch_goes_the_shortest_way() -> None:
-    """The displacement of each joint is the least of all full turns that the limits allow."""
+    """Without windings, every joint of a candidate takes its shortest way within the limits."""
     for own in (ROBOT.limits, NARROW):
         task = problem(goal=tcp_pose(GOAL), limits=own, windings=False)
         found = candidates(task)
@@ -131,8 +132,11 @@ def test_between_poses_relative_travels_are_distinct() -> None:
 
 @pytest.mark.parametrize("own", [ROBOT.limits, NARROW], ids=["two turns", "one and a bit"])
 def test_between_poses_every_joint_may_go_either_way_round(own: Any) -> None:
-    """Each joint's travels, branch by branch: all of less than a full turn that the limits
-    allow."""
+    """Between two poses, every joint may turn either way around.
+
+    For every branch pair, the candidates cover all displacements below a full turn inside the
+    limits.
+    """
     task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL), limits=own)
     found: dict[tuple[str, str], list[Candidate]] = {}
     for candidate in candidates(task):
@@ -155,8 +159,10 @@ def test_between_poses_every_joint_may_go_either_way_round(own: Any) -> None:
 @pytest.mark.parametrize("count", long_but((200,), (200, 2000)))
 @pytest.mark.parametrize("own", [ROBOT.limits, NARROW], ids=["two turns", "one and a bit"])
 def test_between_poses_nothing_that_may_be_best_is_missing(own: Any, count: int) -> None:
-    """Every pair of configurations has a candidate of its own displacement, or one that ends alike
-    and travels no further."""
+    """Every pair of configurations has a candidate with at most its displacement in every joint.
+
+    The two displacements differ by full turns only.
+    """
     task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL), limits=own)
     kept = np.array([candidate.q_goal - candidate.q_start for candidate in candidates(task)])
     starts, goals = every_configuration(START, task), every_configuration(GOAL, task)
@@ -178,7 +184,7 @@ def test_between_poses_nothing_that_may_be_best_is_missing(own: Any, count: int)
     ],
 )
 def test_a_branch_filter_keeps_what_it_names(wanted: dict[str, Any]) -> None:
-    """At both ends, where both are poses; joints that are given stay whatever they are."""
+    """The filter applies to ends given as poses; ends given as joints are never filtered."""
     given = BranchFilter(**wanted)
     everything = candidates(problem(start=tcp_pose(START), goal=tcp_pose(GOAL)))
     found = candidates(problem(start=tcp_pose(START), goal=tcp_pose(GOAL), branch=given))
@@ -196,7 +202,7 @@ def test_a_branch_filter_keeps_what_it_names(wanted: dict[str, Any]) -> None:
 
 
 def test_a_branch_that_does_not_reach_the_pose_is_refused() -> None:
-    """Where the elbow may only bend one way, the other way is no branch of the pose."""
+    """A limited elbow excludes one branch of the pose; a request for this branch is an error."""
     bent = replace(ROBOT.limits, q_min=np.where(np.arange(6) == 2, 1e-3, ROBOT.limits.q_min))
     one_elbow = problem(goal=tcp_pose(GOAL), limits=bent)
     reached = {tuple(candidate.goal.label.split("/")[:2]) for candidate in candidates(one_elbow)}
@@ -214,7 +220,7 @@ def test_a_branch_that_does_not_reach_the_pose_is_refused() -> None:
 
 
 def test_torque_that_cannot_hold_an_end_rules_it_out() -> None:
-    """Where no end can be held, the joint, what it needs and what it has are told."""
+    """If no end can be held, the message names the joint, its required and its available torque."""
     weak = limits(tau_max=[150, 5, 150, 28, 28, 28])
     task = PreparedProblem.of(problem(limits=weak))
     with pytest.raises(TorqueInfeasible) as refusal:
@@ -242,14 +248,15 @@ def test_torque_that_cannot_hold_an_end_rules_it_out() -> None:
     assert {candidate.status for candidate in found} == {"infeasible", "unvisited"}
 
 
-# clearance [m] that an end has, less than what is kept of it, and of a ball that touches it
+# clearance [m] at an end, smaller than the planning margin, and the clearance of a ball in contact
 TOO_NEAR = 1e-4
 TOUCHING = -1e-4
 
 
 def beside_goal(asked: Problem, clearance: float) -> Problem:
-    """The problem with a ball beside the elbow at GOAL, on its axis, so that the arm has this
-    clearance [m] there.
+    """The problem with a ball beside the elbow at GOAL.
+
+    The ball lies on the axis of the elbow and leaves the arm the given clearance [m] at GOAL.
     """
     low, high = 0.0, 1.0
     data = ROBOT.model.createData()
@@ -270,8 +277,11 @@ def beside_goal(asked: Problem, clearance: float) -> Problem:
 
 
 def test_an_end_whose_clearance_is_too_small_to_plan_for_counts_in_the_bound() -> None:
-    """Other motions may go there, and need less than the answer, which does not claim to be the
-    best. One may be found as a baseline."""
+    """An end with a clearance below the planning margin still counts in the lower bound.
+
+    Motions to this end may need less energy than the answer, so the answer is not reported as
+    optimal. A baseline may be such a motion.
+    """
     asked = problem_with(START, tcp_pose(GOAL), windings=False)
     free = optimize(asked)
     assert np.allclose(free.goal.q, GOAL)
