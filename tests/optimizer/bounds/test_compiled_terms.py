@@ -132,7 +132,7 @@ def test_an_arm_of_two_joints_has_none_beside_the_grid() -> None:
 
 
 def test_deviation_of_cells() -> None:
-    """The deviation is the farthest corner's distance from the mean, plus the curvature in between."""
+    """The deviation is the farthest corner's distance from the mean, plus the curvature between."""
     rng = np.random.default_rng(1)
     cells = GridCells((np.array([-0.5, -0.1, 0.2]), np.array([-0.3, 0.0, 0.1, 0.7])))
     value, mean = rng.normal(size=(2, 2, 12, 5)), rng.normal(size=(2, 5))

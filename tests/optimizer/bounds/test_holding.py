@@ -155,7 +155,7 @@ def test_a_free_joint_comes_near_the_linear_energy() -> None:
 def linear_ratios(
     torques: Torques, start: Array, goal: Array, joints: Array, rng: np.random.Generator
 ) -> Iterator[float]:
-    """Ratios of bounds to linearised energies of motions, with multipliers for some joints (nq,)."""
+    """Ratios of bounds to linearised energies, with multipliers for some joints (nq,)."""
     prepared = torques.task
     task, law, holding = prepared.problem, prepared.arm.friction_law, HoldingCells.of(prepared)
     assert holding is not None

@@ -141,7 +141,7 @@ def test_between_poses_and_among_several_targets() -> None:
 
 @pytest.mark.long
 def test_no_configuration_on_a_singularity_is_below() -> None:
-    """Configurations on a singularity, given by their joints, are easily missed by curve tracing."""
+    """Configurations on a singularity are given by joints, as curve tracing easily fails there."""
     rng, (start, _) = np.random.default_rng(9), tasks("gen3", 1)[0]
     compared = 0
     for _ in range(8):

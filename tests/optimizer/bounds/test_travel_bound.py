@@ -1,4 +1,4 @@
-"""The bound on travel: its sum over the parts of a rest-to-rest motion is at most the energy drawn."""
+"""The bound on travel: its sum over the parts of a motion is at most the drawn energy."""
 
 from __future__ import annotations
 

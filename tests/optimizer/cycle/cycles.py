@@ -1,4 +1,4 @@
-"""Cycles that tests share: seeded poses in front of a UR5e, a part carried on every other move."""
+"""Cycles for tests: seeded poses in front of a UR5e, with a part carried on every other move."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PART = Payload(mass=2.0, com=np.array([0.0, 0.0, 0.05]))
 
 
 def poses(seed: int, count: int) -> list[Pose]:
-    """Poses with the tool nearly down, where the arm reaches them in every branch."""
+    """Poses with the tool nearly down, within reach of every branch."""
     rng, found = np.random.default_rng(seed), list[Pose]()
     while len(found) < count:
         position = rng.uniform([-0.6, -0.6, 0.05], [0.6, 0.6, 0.4])
@@ -28,9 +28,7 @@ def poses(seed: int, count: int) -> list[Pose]:
 
 
 def pick_and_place(seed: int, count: int, **given: Any) -> Cycle:
-    """A cycle of `count` stops, at which the part is taken up and put down in turn; nothing hits
-    anything.
-    """
+    """A cycle of `count` stops without collisions, with a part taken up and put down in turn."""
     arm = given.pop("arm", Arm(robot=ROBOT, collisions=False))
     stops = [
         Stop(name=f"stop {k}", target=pose, dwell=0.3, payload=PART if k % 2 == 0 else Payload())

@@ -42,7 +42,7 @@ from tests.optimizer.moves import AMPLE
 from tests.selection import long_but
 
 AXIS = np.array([0.0, 0.0, 1.0])
-# angles of the tool of the chains that attack a bound; J: rounding of energies
+# angles of the tool in the attacks on a bound; rounding of energies [J]
 ANGLES = 16
 ROUNDING = 1e-6
 
@@ -73,7 +73,7 @@ def _cycle(seed: int, robot: str = "ur5e") -> Cycle:
 
 @pytest.fixture(autouse=True)
 def few_angles(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fewer angles than a request has: the bound is that of all angles anyway."""
+    """Fewer angles than in a request, as the bound covers all angles anyway."""
     settings = replace(tool_turns.TOOL_TURNS, angles=(0.0, 2.0, 4.0))
     monkeypatch.setattr(tool_turns, "TOOL_TURNS", settings)
 
@@ -108,8 +108,9 @@ def _reaching(arm: Arm, end: Pose | ConeOrientedPose, rng: np.random.Generator) 
 
 
 def _least_of_some(asked: Cycle, chain: FreeEndsChain, rng: np.random.Generator) -> float:
-    """The least bound [J] of chains of configurations at random angles: those near each other on
-    the path.
+    """The least bound [J] of chains of configurations at random angles.
+
+    Consecutive configurations on the path are near each other.
     """
     path, legs = asked.stops[0].path, chain.legs
     assert path is not None
@@ -147,7 +148,7 @@ def test_no_chain_has_less(seed: int, robot: str) -> None:
     bound = chain.least(NEVER)
     found = _least_of_some(asked, chain, np.random.default_rng(seed))
     assert 0 < bound <= found + ROUNDING
-    # and it is near: what it leaves open is little
+    # the bound is also near the found energy
     assert bound > 0.85 * found
 
 
@@ -163,7 +164,7 @@ def test_the_quick_bound_is_no_more_than_the_bound() -> None:
     )
     gain = rng.uniform(-30.0, 60.0, (30, 30))
     found = quick.between(a, b, gain)
-    # anywhere in the boxes, with any full turn of joints that are not placed
+    # random points of the boxes, with random full turns of unplaced joints
     qa, qb = (x.centre + rng.uniform(-1, 1, x.half.shape) * x.half for x in (a, b))
     apart = qb[None] - qa[:, None]
     apart = np.where(a.placed[:, None] & b.placed, apart, wrapped(apart))
@@ -173,7 +174,7 @@ def test_the_quick_bound_is_no_more_than_the_bound() -> None:
 
 @pytest.mark.parametrize("shape", ["line", "corner", "arc"])
 def test_no_way_within_the_tolerance_is_shorter_than_the_least(shape: str) -> None:
-    """A motion that cuts every corner by the tolerance still goes the least way."""
+    """A motion that cuts every corner by the tolerance still has the least length."""
     rng = np.random.default_rng(0)
     poses = [
         Pose.from_quaternion(at, [0.0, 1.0, 0.0, 0.0])
@@ -220,8 +221,10 @@ def _dense(points: Array) -> Array:
 
 @pytest.mark.parametrize("seed", long_but([0], range(8)))
 def test_no_chain_through_free_stops_has_less(seed: int) -> None:
-    """Two stops that leave the angle free, with a payload between them: all configurations at many
-    angles, with any full turns."""
+    """Two stops with a free angle, and a payload in between, against chains of configurations.
+
+    The chains use many angles, all configurations and full turns.
+    """
     rng = np.random.default_rng(seed)
     arm = Arm(robot=load_robot("ur5e"), collisions=False)
     ends = [

@@ -1,4 +1,4 @@
-"""Cycles with stops whose pose leaves the posture free: of a redundant or a singular arm."""
+"""Cycles with free postures at stops, for redundant or singular arms."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.optimizer.cycle.test_optimize_cycle import planned
 from tests.optimizer.moves import AMPLE
 from tests.selection import long_but
 
-# rad: a step along the curve; relative: what solves of the same motion may differ by
+# rad: a step along the curve; relative: difference between solves of the same motion
 STEP = 0.1
 AGREED = 2e-3
 POSTURES = {

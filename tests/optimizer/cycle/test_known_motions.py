@@ -1,4 +1,4 @@
-"""Motions that are known change the time until an answer is there, and nothing else."""
+"""Known motions change the time of a search, and never its answer."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ from tests.refusals import refusal_of
 
 INTO = Line(direction=np.array([0.0, 0.0, 1.0]), distance=0.08)
 OUT = Line(direction=np.array([0.0, 0.0, 2.0]), frame="base", distance=0.06, speed=0.3)
-# relative: an optimum that is reached in another search
+# relative difference from an optimum of another search
 CONVERGED = 2e-3
 
 
@@ -77,7 +77,7 @@ def test_the_tool_comes_and_leaves_straight() -> None:
 
 
 def test_what_is_grasped_is_no_obstacle_on_the_lines() -> None:
-    """A box around the stop: nothing gets there but along the lines, on which it does not count."""
+    """A box around the stop blocks every way except the lines, and is no obstacle on the lines."""
     (stop,) = pick_and_place(1, 1).stops
     assert isinstance(stop.target, Pose)
     box = Obstacle(

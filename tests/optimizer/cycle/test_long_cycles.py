@@ -24,13 +24,12 @@ from tests.refusals import refusal_of
 
 # a counting clock never comes to it
 ENDLESS = 1e9
-# share of the readings of a whole search after which the cycle has been found, and the search goes
-# on
+# share of a whole search's clock readings by which the cycle is found, with the search going on
 ENOUGH = 0.75
 
 
 def long_cycle(deadline: float) -> Cycle:
-    """One stop more than a cycle of which it is proven that no chain is better."""
+    """A cycle with one stop more than the largest one solved to proven optimality."""
     asked = pick_and_place(
         1, CYCLE_SEARCH.many_stops + 1, windings=False, method="time_scaling", deadline=deadline
     )
@@ -43,8 +42,7 @@ Whole = tuple[CycleSolution, list[Event], float]
 
 @pytest.fixture(scope="module")
 def whole() -> Whole:
-    """The long cycle without a deadline, what it told, and the readings of the clock that it
-    took."""
+    """The long cycle without a deadline, its events, and its number of clock readings."""
     events, clock = list[Event](), CountingClock()
     found = plan_cycle(long_cycle(ENDLESS), clock, events.append)
     return found, events, clock.now

@@ -1,6 +1,4 @@
-"""Cycles of least mechanical work: true, within their time, with a bound that no other round gets
-below.
-"""
+"""Cycles of least mechanical work: exact energies, a kept cycle time, and a valid bound."""
 
 from __future__ import annotations
 
@@ -91,9 +89,7 @@ def test_no_random_cycle_gets_below_the_bound() -> None:
 
 @pytest.mark.long
 def test_what_the_price_bounds_holds_for_every_duration() -> None:
-    """Against motions from end to end in many durations; without a price it is that of the longest
-    motion.
-    """
+    """The bound with a price holds for every duration; without a price, for the longest one."""
     rng, own = np.random.default_rng(1), ROBOT.limits
     prepared = PreparedProblem.of(
         Problem(arm=ASKED.arm, start=HOME, goal=HOME, objective="mechanical", duration_max=5.0)

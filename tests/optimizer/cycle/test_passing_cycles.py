@@ -112,7 +112,7 @@ def test_every_pass_is_where_its_target_says_and_when_the_answer_says() -> None:
 
 
 def test_the_best_of_all_configurations_is_found() -> None:
-    """With two targets at two passes, the answer is the best of all separately solved combinations."""
+    """With two targets at two passes, the answer is the best of all combinations."""
     targets = [[q, q + np.array([0.3, -0.3, 0.3, 0, 0, 0])] for q in Q[:2]]
     stops = [
         Stop(name=f"{k}", target=AnyOf(tuple(each)), via=True) for k, each in enumerate(targets)

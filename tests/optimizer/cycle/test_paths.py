@@ -51,7 +51,7 @@ from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 from tests.refusals import refusal_of
 
 FREE = Arm(robot=ROBOT, collisions=False)
-# relative: an optimum that is reached in another search
+# relative difference from an optimum of another search
 CONVERGED = 2e-3
 
 
@@ -133,8 +133,10 @@ def test_it_is_the_least_over_all_branches_of_the_path() -> None:
 
 @pytest.mark.long
 def test_lines_lead_to_a_path_and_from_it_in_a_given_time() -> None:
-    """The path is at its greatest speed for most of its length: all the time that is left is for
-    the other moves.
+    """Lines may lead to and from a path in a given time.
+
+    The path is at its greatest speed for most of its length; the other moves share the rest of the
+    time.
     """
     asked = a_cycle(
         glue(approach=INTO, retreat=replace(INTO, distance=0.05), branch=BranchFilter("left", "up"))
@@ -149,7 +151,7 @@ def test_lines_lead_to_a_path_and_from_it_in_a_given_time() -> None:
 
 
 def test_each_of_several_targets_has_lines_of_its_own() -> None:
-    """At a price of time, too, where the motions of a leg share what is prepared."""
+    """Every target of a stop has its own lines, also at a price of time with shared preparation."""
     (first,), (second,) = pick_and_place(1, 1).stops, pick_and_place(5, 1).stops
     either = AnyOf((first.target, second.target))  # type: ignore[arg-type]
     stop = replace(
@@ -167,8 +169,10 @@ def test_each_of_several_targets_has_lines_of_its_own() -> None:
 
 @pytest.mark.long
 def test_what_ends_a_path_is_told_of_each_branch() -> None:
-    """A joint range is in the way of some, another line of the stop in that of others, an obstacle
-    of the last.
+    """The report tells the end of the path for every branch.
+
+    The causes are a joint range for some branches, another line of the stop for others, and an
+    obstacle for the last one.
     """
     own = ROBOT.limits
     narrow = own.tightened(

@@ -34,7 +34,7 @@ LARGE = Bus("storage", 0.9, 30.0, 500.0)
 SMALL = Bus("storage", 0.9, 3.0, 100.0)
 
 
-# s: little more than the shortest cycle takes, so that braking leaves surplus
+# s: slightly longer than the shortest cycle, so that braking leaves surplus
 TIME = 2.1
 HURRIED = replace(ASKED, duration_min=TIME, duration_max=TIME)
 
@@ -56,7 +56,7 @@ def test_the_cycle_is_true(bus: Bus) -> None:
     assert all(move.solution.certificate.valid for move in round_.moves) and round_.joins < ROUNDING
     assert electrical.parts_sum == pytest.approx(electrical.total, rel=ROUNDING)
     assert round_.lower_bound <= electrical.total
-    # the charge runs on from leg to leg, and a closed round ends with that with which it begins
+    # the charge is continuous from leg to leg, and a closed round ends with its initial charge
     assert (
         use is not None
         and use.charged > 1.0
@@ -70,10 +70,10 @@ def test_the_cycle_is_true(bus: Bus) -> None:
     for before, after in pairwise(round_.moves):
         assert after.charges[0] == before.charges[-1]
     assert use.charged == pytest.approx(sum(own.charged for own in stored if own), rel=QUADRATURE)
-    # what is stored comes back, but for the loss
+    # the storage returns the stored energy minus its loss
     assert use.discharged == pytest.approx(bus.efficiency * use.charged, rel=QUADRATURE)
     names = {each.name: each for each in round_.baselines}
-    # braking gives back so much that it pays
+    # the storage pays off, as braking returns much energy
     assert names["without_storage"].saving > (0.05 if bus == LARGE else 0.0)
 
 
@@ -91,8 +91,10 @@ def test_without_room_it_is_the_shared_bus_and_without_limits_the_recuperating_o
 
 @pytest.mark.long
 def test_no_motions_with_the_storage_get_below_the_bound() -> None:
-    """Even paces in random shares of the time, valued with the storage from the charge that they
-    end with.
+    """The bound is below all motions with the storage.
+
+    The motions have even paces in random shares of the time. The energy counts from a charge equal
+    to the final one.
     """
     asked, rng = with_bus(HURRIED, LARGE), np.random.default_rng(0)
     bound, plant = found(LARGE).lower_bound, Plant(asked.arm)

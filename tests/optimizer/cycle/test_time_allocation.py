@@ -22,10 +22,10 @@ from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.plan_cycle import PLAN_CYCLE
 from tests.selection import long_but
 
-# W: what a wait draws
+# W: power of a wait
 WAITING = 5.0
-# energies above the optimum, relative: what is promised, and a wait of which a little could have
-# been a slower move
+# relative excess over the optimal energy: the promised gap, and a wait that a slower move could
+# have saved in part
 ENERGY = ALLOCATION.duality_gap + ALLOCATION.worth_slowing**2
 
 
@@ -68,9 +68,7 @@ def moves_of(seed: int) -> list[Move]:
 
 
 def least(moves: list[Move], time: float, waiting: float) -> float:
-    """A lower bound [J] on what the moves and a wait need in a time [s]: a linear programme over
-    tangents.
-    """
+    """A lower bound [J] on moves and a wait in a time [s], by a linear programme over tangents."""
     n = len(moves)
     rows, limits = [], []
     for k, move in enumerate(moves):
@@ -110,7 +108,7 @@ class TestFilling:
             assert found.least == pytest.approx(
                 needed - ALLOCATION.worth_slowing * WAITING * found.waited, rel=ENERGY
             )
-        # the tangents are below the energies by less than 1e-5 of them
+        # the tangents are below the energies by less than 1e-5 of the energies
         assert needed == pytest.approx(least(moves, time, WAITING), rel=ENERGY + 1e-5)
 
     @pytest.mark.parametrize("factor", [1.05, 1.5, 3.0, 20.0])
@@ -137,8 +135,10 @@ def test_moves_that_gain_more_than_they_need(seed: int) -> None:
 
 
 def test_where_every_share_of_the_time_needs_the_same_any_is_the_best() -> None:
-    """Energies in proportion to durations: at the one price that counts, the durations jump from
-    end to end.
+    """Any allocation is optimal if all have the same energy.
+
+    The energies are in proportion to the durations, so at one price the durations jump from end to
+    end.
     """
     moves = [Move(0.0, drawn, 1.0, 5.0) for drawn in (3.0, 3.0)]
     found = TimeAllocation(moves).allocate(7.0, WAITING, fastest(moves))
@@ -160,7 +160,7 @@ def test_one_move_and_moves_of_one_duration() -> None:
 def test_where_the_durations_jump_the_best_is_not_known() -> None:
     @dataclass(frozen=True)
     class Jumping(Move):
-        """A move that is either fast or slow: its energy is not convex in between."""
+        """A move with two speeds, fast and slow, and so with a nonconvex energy."""
 
         def at(self, price: float) -> Jumping:
             """The better of the two."""
@@ -178,14 +178,14 @@ Q: Array = np.zeros(6)
 
 
 def motion(duration: float, energy: float) -> PricedMotion:
-    """A motion of which duration [s] and energy [J] count."""
+    """A motion with a given duration [s] and energy [J]."""
     return PricedMotion(quintic_spline(Q, Q + 0.1, duration), energy)
 
 
 def move(
     monkeypatch: pytest.MonkeyPatch, known: list[PricedMotion], *solved: PricedMotion | None
 ) -> PricedPair:
-    """A move whose solves have these results, one after the other."""
+    """A move with these results of consecutive solves."""
     results = iter(solved)
     monkeypatch.setattr(priced_search, "priced_motion", lambda *_: next(results))
     return PricedPair(cast(Leg, None), 0, 0, LONGEST, NEVER, known)

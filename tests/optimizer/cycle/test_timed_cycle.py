@@ -109,8 +109,9 @@ def test_it_is_not_dearer_than_simple_ways_to_share_the_time(factor: float) -> N
 
 
 def test_no_other_way_to_share_the_time_is_cheaper() -> None:
-    """Every move in every share of the time, on the same chain: a grid of durations, each by
-    `optimize`.
+    """No other allocation of the time to the moves of the chain needs less energy.
+
+    A grid of durations covers all shares; `optimize` solves every move at every duration.
     """
     found = timed(1.3)
     total = sum(move.solution.duration + move.wait for move in found.moves)
@@ -191,9 +192,7 @@ def test_the_bound_holds_for_every_chain_and_share(seed: int) -> None:
 def test_a_least_time_is_bounded_for_longer_cycles_and_longer_moves_too(
     hold: dict[str, Any],
 ) -> None:
-    """Of a least time alone, the bound holds for cycles that take longer, and for moves that take
-    longer than it.
-    """
+    """A given least time alone also bounds longer cycles, and moves longer than this time."""
     asked = Cycle(
         arm=ASKED.arm,
         start=HOME,
@@ -280,8 +279,11 @@ REFUSALS = {"no time": DeadlineExceeded([]), "no motion": NoTrajectory([])}
 def test_time_that_cannot_be_shared_leaves_simpler_cycles(
     where: str, problem: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Among obstacles, what shares the time may end by the deadline, or miss a motion: the moves
-    slowed alike, and the fastest ones with a wait, are known by then."""
+    """If the allocation of time fails among obstacles, simpler cycles remain.
+
+    A deadline or a missing motion may end the allocation. The evenly slowed moves, and the fastest
+    ones with a wait, are known by then.
+    """
 
     def fails(*_: Any) -> Any:
         raise REFUSALS[problem]
@@ -297,5 +299,5 @@ def test_time_that_cannot_be_shared_leaves_simpler_cycles(
         assert found.duration == pytest.approx(asked.duration_max, rel=ROUNDING)
         (taken,) = (each for each in found.baselines if each.name == name)
         assert found.energy.electrical.total == pytest.approx(taken.electrical, rel=ROUNDING)
-        # slowed alike, they need less than a wait after them
+        # evenly slowed moves need less energy than fast moves with a wait
         assert (sum(move.wait for move in found.moves) > 0) == (factor == SHORTER)

@@ -1,4 +1,4 @@
-"""No pose made by forward kinematics is refused, whatever the axes of the arm and its drawing."""
+"""No pose from forward kinematics is refused, whatever the axes and zero positions of the arm."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from tests.optimizer.kinematics.axis_patterns import (
 from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, flange, solved
 from tests.selection import long_but
 
-# a cache full of these arms would drop those of other tests
+# without the cache, as these arms would displace the arms of other tests
 uncached = inverse_kinematics_for.__wrapped__
 PATTERNS = list(product(RELATIONS, repeat=5))
-# arms whose configurations the closed form of three parallel or meeting axes finds
+# arms with a closed form, due to three parallel or meeting axes
 TRIOS: list[tuple[Relation, ...]] = [
     ("square", "opposed", "opposed", "square", "square"),
     ("square meeting", "parallel", "opposed", "square meeting", "square meeting"),
@@ -58,7 +58,8 @@ def test_no_pose_of_any_pattern_is_refused(count: int) -> None:
             errors = [np.abs(flange(robot, each.q) - T).max() for each in found]
             assert min(errors) < ACCURACY
             for each, error in zip(found, errors, strict=True):
-                # where branches meet, a configuration may keep a small error, as `Reach` says
+                # at meeting branches, a configuration may keep a small error, as documented in
+                # `Reach`
                 at_edge = each.smallest_singular_value < REACH.singular
                 assert error < (REACH.residual if at_edge else ACCURACY)
         except (SingularPose, NoConfigurationFound) as error:
@@ -88,7 +89,7 @@ def test_a_redrawn_arm_moves_alike() -> None:
 
 
 def test_nothing_found_does_not_claim_the_pose_out_of_reach() -> None:
-    """At nearly the length of all links together, without a proof that they do not reach so far."""
+    """An empty result near the full length of the arm is no proof of a pose out of reach."""
     rng = np.random.default_rng(5)
     robot = robot_of(random_axes(("square", "oblique", "square", "oblique", "square"), rng))
     kinematics, chain = required_inverse_kinematics(robot, "goal"), Chain.of(robot.model)

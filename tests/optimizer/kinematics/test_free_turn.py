@@ -1,4 +1,4 @@
-"""Seven-joint arms with a spherical shoulder at singularities, where joints turn freely."""
+"""Seven-joint arms with a spherical shoulder at singularities with freely turning joints."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from tests.selection import long_but
 # uncertainty of angles next to a singularity, times the distance from it, of a pose rounded to
 # double precision [rad²]; larger for the xArm, whose elbow may be nearly folded, too
 ROUNDED = {"panda": 1e-14, "iiwa14": 1e-14, "xarm7": 3e-14}
-# configurations next to a singularity that no curve passes exactly, the first one stretched up to
-# 5.7e-6 rad [rad]
+# configurations [rad] beside a singularity and slightly off every curve; the first arm is stretched
+# up to 5.7e-6 rad
 MISSED = {
     "iiwa14": [
         0.176878052873,
@@ -76,7 +76,7 @@ def test_a_pose_on_a_singularity_or_next_to_it_is_reached(
         solutions = required_inverse_kinematics(robot, "goal").solve(T)
         assert max(np.abs(flange(robot, each.q) - T).max() for each in solutions) < ACCURACY
         if joint == 3 and robot.name == "iiwa14":
-            # A nearly stretched arm holds its pose on loops so small that rounding hides them.
+            # A nearly stretched arm holds its pose on very small loops, hidden by rounding.
             curves = arm.self_motions(T, robot.limits)
             assert away(curves, q) < SETTINGS.loop_half_width
             inside = []
@@ -121,7 +121,7 @@ def test_a_free_turn_on_a_singularity_is_a_curve(joint: int, step: list[float]) 
 
 
 def test_limits_keep_free_turns_within_them() -> None:
-    """First and third axis in line; only curves that may pass this are searched for it."""
+    """With the first and third axis in line, only curves near this singularity are searched."""
     rng = np.random.default_rng(52)
     for name in ("iiwa14", "panda", "xarm7"):
         robot = load_robot(name)
@@ -136,9 +136,10 @@ def test_limits_keep_free_turns_within_them() -> None:
 
 
 def test_boxes_hold_the_configurations_of_a_free_turn(robot: Robot, arm: RedundantArm) -> None:
-    """With the third axis in line with the first, both turn against each other at a constant last
-    angle. No curve over the last angle has these configurations, but the box around the point holds
-    them.
+    """Boxes around a curve also cover the configurations of a free turn on its singularity.
+
+    With the first and third axis in line, both joints turn against each other at a constant last
+    angle. Curves over the last angle do not contain such turns, but the box around the point does.
     """
     rng = np.random.default_rng(48)
     for q in configurations(robot, 10, seed=49):

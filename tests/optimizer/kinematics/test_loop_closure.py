@@ -1,4 +1,4 @@
-"""All roots of the closed loop of arms whose axes are parallel, meet, or neither."""
+"""All roots of closed loops of arms with parallel, meeting or skew axes."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def reached(closure: LoopClosure, T: Array) -> Array | None:
 
 
 def test_every_pattern_of_axes_has_its_configurations_among_the_roots() -> None:
-    """That of forward kinematics is among them; all roots are reached but at rare poses."""
+    """The given configuration is among the roots, and except at rare poses all roots are exact."""
     rng, patterns = np.random.default_rng(12), list(product(RELATIONS, repeat=5))
     unreached, count = 0, 60
     for _ in range(count):

@@ -1,4 +1,4 @@
-"""Boxes of joint positions narrowed to a pose: no configuration that reaches it is lost."""
+"""Boxes of joint positions narrowed to a pose, without a loss of any configuration of the pose."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ ARMS: dict[str, Arm] = {
 def reached(
     rng: np.random.Generator, arm: Arm, half_angle: float
 ) -> tuple[Array, ConeOrientedPose]:
-    """Configuration, and a pose that it reaches, often at the edge of its cone."""
+    """A configuration and a goal it reaches, often at the edge of the goal's cone."""
     q = rng.uniform(-np.pi, np.pi, arm.robot.nq)
     q[rng.random(len(q)) < 0.2] = 0.0  # stretched and aligned, as singular ones are
     T = tcp_pose(arm, q)
@@ -48,7 +48,7 @@ def reached(
 
 
 def boxes_around(rng: np.random.Generator, q: Array, count: int) -> tuple[Array, Array]:
-    """Random boxes that hold q, from narrow ones to the whole range, some with q in a corner."""
+    """Random boxes around q, from narrow ones to the whole range, some with q in a corner."""
     half = np.minimum(10 ** rng.uniform(-4, 0.6, (count, len(q))), np.pi)
     within = np.where(
         rng.random(half.shape) < 0.2,
@@ -59,7 +59,7 @@ def boxes_around(rng: np.random.Generator, q: Array, count: int) -> tuple[Array,
 
 
 def lost(q: Array, centre: Array, half: Array, held: Array) -> Array:
-    """Mask (b,) of the boxes that do not hold q, up to full turns."""
+    """Mask (b,) of the boxes without q, up to full turns."""
     return np.asarray(~(held & (np.abs(wrapped(q - centre)) <= half + ROUNDING).all(axis=1)))
 
 

@@ -1,4 +1,4 @@
-"""Boxes for cells of flange poses hold every configuration that reaches a pose of the cell."""
+"""Boxes for cells of flange poses contain every configuration with a pose in the cell."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ ARMS = {
 
 
 def _moved(cells: PoseCells, T: Array, spread: Array, rng: np.random.Generator) -> Array:
-    """A middle (4, 4) of a cell of extent h, across, above (3,) that holds the pose T (4, 4)."""
+    """Centre (4, 4) of a cell with extents h, across, above (3,) around the pose T (4, 4)."""
     h, across, above = spread * rng.choice([1.0, 0.5], 3)
     aside = np.cross(cells.up, rng.normal(size=3))
     shift = across * aside / np.linalg.norm(aside) + above * rng.choice([-1, 1]) * cells.up

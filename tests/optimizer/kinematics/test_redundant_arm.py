@@ -26,17 +26,16 @@ from tests.optimizer.kinematics.seven_joints import (
 )
 from tests.selection import long_but
 
-# largest distance from its curve of a configuration found by Newton's method, which stops at 1e-11
-# [rad]
+# largest distance from the curve for results of Newton's method with a tolerance of 1e-11 [rad]
 FOUND_BY_NEWTON = 1e-5
 # largest distance of an approximately nearest member, relative to the nearest one
 ROUGHLY = 1.5
-# largest distance of an arc beyond the limits, that of the last undecided box [rad]
+# largest distance of an arc beyond the limits, equal to the last undecided box [rad]
 BEYOND = 0.15
 # relative accuracy of a distance to reach
 SAME = 1e-6
-# configurations [rad] of an iiwa14 on curves whose middle is outside the limits, and whose ends
-# other curves share; once, only middle and ends were tested
+# configurations [rad] of an iiwa14 on curves with shared ends and a middle outside the limits:
+# tests of ends and middle alone miss these curves
 OUTSIDE_IN_THE_MIDDLE = (
     [
         0.622008753913,
@@ -94,9 +93,7 @@ def test_every_member_reaches_the_pose(robot: Robot, arm: RedundantArm) -> None:
 
 
 def newton(robot: Robot, T: Array, q: Array) -> Array | None:
-    """Configuration that reaches T, from q by damped Newton steps with Pinocchio's Jacobian; None
-    if none is found.
-    """
+    """Configuration at T by damped Newton steps from q with Pinocchio's Jacobian, or None."""
     model, data = robot.model, robot.model.createData()
     frame, goal = model.getFrameId("flange"), pin.SE3(T)
     for _ in range(60):
@@ -130,7 +127,7 @@ def test_solutions_of_newtons_method_are_on_a_curve(robot: Robot, arm: Redundant
 def test_the_nearest_member_is_found_for_configurations_off_the_curve(
     robot: Robot, arm: RedundantArm
 ) -> None:
-    """Also where two branches meet, and the last angle is no guide."""
+    """This includes points with two branches meeting, without guidance from the last angle."""
     rng = np.random.default_rng(47)
     for q in configurations(robot, 6):
         for curve in arm.self_motions(flange(robot, q), robot.limits):
@@ -155,7 +152,7 @@ def test_boxes_hold_the_curve(robot: Robot, arm: RedundantArm) -> None:
 
 
 def test_boxes_shrink_onto_the_curve(robot: Robot, arm: RedundantArm) -> None:
-    """Boxes are of first order, except where a joint turns ever faster next to a singularity."""
+    """Boxes are of first order, except for fast joints near a singularity."""
     rng, width = np.random.default_rng(45), []
     for q in configurations(robot, 20):
         for curve in arm.self_motions(flange(robot, q), robot.limits):
@@ -165,9 +162,7 @@ def test_boxes_shrink_onto_the_curve(robot: Robot, arm: RedundantArm) -> None:
 
 
 def test_arcs_are_the_parts_within_the_limits(robot: Robot, arm: RedundantArm) -> None:
-    """No member within the limits is cut off, and the arcs are within them except for their
-    ends.
-    """
+    """Arcs contain all members within the limits, and no others except near their ends."""
     limits, rng = robot.limits, np.random.default_rng(46)
     cut, outside = 0, []
     for q in configurations(robot, 20):

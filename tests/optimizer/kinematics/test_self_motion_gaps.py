@@ -20,7 +20,7 @@ COUNT = 24
 
 
 class Corner:
-    """Curve whose joints rest except for a step of 3 rad within a thousandth of the parameter."""
+    """Curve at rest except for a step of 3 rad within a thousandth of the parameter."""
 
     label, free, arcs = None, (0,), [(0.0, 1.0)]
 
@@ -56,7 +56,7 @@ def test_a_jump_ends_after_some_halvings_and_members_keep_their_order() -> None:
 
 
 class Lines:
-    """Curve of two arcs on which the only joint is the parameter."""
+    """Curve with two arcs and one joint equal to the parameter."""
 
     label, free, arcs = None, (0,), [(0.0, 1.0), (2.0, 3.0)]
 
@@ -71,7 +71,10 @@ class Lines:
 def test_members_reach_to_where_a_curve_leaves_the_limits(
     low: float, high: float, added: int
 ) -> None:
-    """But not from one arc to the next; nor does a curve that no member represents have one."""
+    """Members are added up to the limits of an arc.
+
+    None is added across arcs, or to a curve without any member inside the limits.
+    """
     motion: SelfMotion = Lines()  # type: ignore[assignment]
     robot = load_robot("ur5e")
     limits = replace(robot.limits, q_min=np.array([low]), q_max=np.array([high]))

@@ -32,8 +32,10 @@ def test_the_certificate_refuses_what_leaves_the_path() -> None:
 
 
 def test_the_certificate_refuses_a_short_cut_of_a_loop() -> None:
-    """Out and back on nearly the same line: a motion that rests at the start is on the path all the
-    time, but does not follow it.
+    """A motion that skips a loop of the course is refused, even if all its poses are near the path.
+
+    The course goes out and back on nearly the same line. A motion at rest, or turning back halfway,
+    does not follow it.
     """
     out, back = moved([0.0, 0.2, 0.0]), moved([0.0, 0.0, 0.001])
     course = ToolCourse.of(ToolPath(via=[out], blend=0.02), tcp_pose(HOME).T, back.T)
@@ -96,7 +98,7 @@ def test_what_is_no_motion_is_not_certified() -> None:
 
 
 def _courses(rng: np.random.Generator) -> list[Array]:
-    """Points (m, d) of a line, there and back, a knot that crosses itself, and a random walk."""
+    """Points (m, d) of four courses: a line, there and back, a crossing knot, and a random walk."""
     t = np.linspace(0.0, 1.0, 200)
     line = np.stack([0.4 * t, 0 * t, 0 * t], axis=1)
     knot = 0.2 * np.stack([np.sin(4 * np.pi * t), np.sin(6 * np.pi * t), 0 * t], axis=1)
@@ -110,7 +112,10 @@ def _courses(rng: np.random.Generator) -> list[Array]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_all_at_once_are_those_one_by_one(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also for motions that stop early, turn back, or are far off the course."""
+    """The batch gives the same results as single calls.
+
+    Some motions stop early, turn back or are far off the course.
+    """
     rng = np.random.default_rng(seed)
     for known in _courses(rng):
         at, share = np.linspace(0.0, 1.0, len(known)), np.sort(rng.random(80))

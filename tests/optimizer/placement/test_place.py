@@ -1,4 +1,4 @@
-"""Placements whose best place is known by brute force or formula; tolerances of coordinates."""
+"""Placements with a best place known by brute force or by formula; tolerances of coordinates."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ SCATTER = 2e-3  # relative scatter of solves at places a few millimetres apart
 
 
 def check(found: PlacementSolution) -> None:
-    """What holds for every answer."""
+    """Check the promises of every answer."""
     assert found.nominal is None or found.best.energy <= found.nominal.energy
     assert found.lower_bound is not None
     for energy in [found.best.energy, *(each.energy for each in found.map if each.energy)]:
@@ -189,15 +189,17 @@ RATIO = 1.2  # of the energy of a place to its bound
 
 
 def bound_at(x: Array) -> float:
-    """A bound [J] that rises from one corner, and falls where another configuration is in reach: in
-    a part of the region that holds no point of the map.
+    """A bound [J] with a slope and a step, without any point of the map inside the step.
+
+    It rises from one corner. The step down is in a small part of the region, as if another
+    configuration came within reach.
     """
     in_reach = bool(np.all(np.abs(x - [0.13, -0.09]) < [0.08, 0.06]))
     return 100.0 + 10.0 * float(x[0] - x[1]) - (15.0 if in_reach else 0.0)
 
 
 class GivenRounds(Rounds):
-    """Rounds whose bound is `bound_at` and whose energy is a multiple of it, without cycles."""
+    """Rounds without cycles: the bound is `bound_at`, and the energy a multiple of the bound."""
 
     def __init__(self, space: Space, clock: Clock) -> None:
         super().__init__(space, clock)
@@ -226,8 +228,10 @@ class GivenRounds(Rounds):
 def test_bounds_are_descended_from_local_minima_and_from_where_they_may_fall_below_the_least(
     slope: float, starts: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Two opposite corners of nine places are local minima. A fall by a tenth below the least bound
-    is possible from no other place on a steep slope, and from those up to 111 J on a gentle one.
+    """Descents of the bound start at local minima, and near bounds that may fall below the least.
+
+    Two opposite corners of nine places are local minima. With a possible fall of a tenth, no other
+    place qualifies on the steep slope, and all places up to 111 J qualify on the gentle slope.
     """
 
     def checked(_: Rounds, place: Place, end: Deadline) -> Round:

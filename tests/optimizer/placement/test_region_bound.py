@@ -78,7 +78,7 @@ def test_no_joint_moves_the_tool_by_more_than_its_lever(name: str) -> None:
 
 
 def test_the_price_of_travel_is_the_least_over_speeds_and_joints() -> None:
-    """Against a grid of speeds of each joint: no even motion is cheaper per metre."""
+    """The price of travel is the least over a grid of speeds, for even motions of any joint."""
     own_arm = arm()
     law, v_max, power = own_arm.friction_law, own_arm.active_limits.v_max, 40.0
     weights = levers(own_arm)
@@ -88,7 +88,8 @@ def test_the_price_of_travel_is_the_least_over_speeds_and_joints() -> None:
         law.coulomb + law.curved * np.arcsinh(speeds / law.speed) + law.viscous * speeds
     )
     least = power + (lost - price * weights * speeds).min(axis=0).sum()
-    # the grid misses the least by its step, and the price is the greatest that is not negative
+    # the grid misses the minimum by up to a step; the price is the greatest without a negative
+    # minimum
     assert -ROUNDING <= least <= 0.05
     higher = power + (lost - 1.01 * price * weights * speeds).min(axis=0).sum()
     assert higher < 0

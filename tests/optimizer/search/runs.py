@@ -10,14 +10,14 @@ from joulepath.optimizer.search.run import Run
 
 
 def prepared(problem: Problem, **options: Any) -> Run:
-    """A search whose candidates are found and bounded."""
+    """A search with prepared and bounded candidates."""
     run = Run(problem, **options)
     run.prepare()
     return run
 
 
 def explored(problem: Problem) -> Candidate:
-    """The best candidate before refinement and bounds, which take most of the time of a search."""
+    """The best candidate before refinement and bounds, the slowest parts of a search."""
     run = prepared(problem)
     run.explore()
     best = run.state.best()

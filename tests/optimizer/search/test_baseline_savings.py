@@ -83,7 +83,7 @@ def test_energies_balance() -> None:
 
 @pytest.mark.parametrize("friction", list(ROBOT.friction_laws))
 def test_energies_are_of_the_friction_law_asked_for(friction: str) -> None:
-    """Each law's own loss, ∫ v · friction(v) dt, from the motion's samples."""
+    """The energy of a baseline contains ∫ v · friction(v) dt of the requested friction law."""
     task = problem(friction=friction)
     torques, potential, _ = oracle(task)
     motion = quintic(START, GOAL, DURATION)
@@ -94,7 +94,7 @@ def test_energies_are_of_the_friction_law_asked_for(friction: str) -> None:
 
 @pytest.mark.parametrize("objective", ["electrical", "mechanical"])
 def test_report(objective: str) -> None:
-    """All six, in order, each with its saving of the objective, however the comparison ends."""
+    """The report has all six baselines in order, with their savings of the objective."""
     task = problem(objective=objective, duration_min=DURATION, duration_max=DURATION)
     report = compare(task)
     assert list(report) == NAMES
@@ -137,7 +137,7 @@ def test_a_saving_is_claimed_in_the_same_time_against_what_keeps_every_limit() -
     assert wait > 1.0
     assert ruckig.saving == pytest.approx(1 - 60.0 / (ruckig.electrical + wait), rel=EXACT)
     assert slowed.saving == pytest.approx(1 - 60.0 / slowed.electrical, rel=EXACT)
-    # ours waits for what takes longer
+    # our motion waits for the longer baseline
     short = replace(ours, duration=ruckig.duration / 2)
     again = {each.name: each for each in with_savings(table, task, short, goal)}["ruckig"]
     more = ruckig.duration / 2 * goal.power
@@ -192,7 +192,7 @@ def test_within_limits_of_torque() -> None:
 
 
 def test_trapezoids_pass_without_a_jerk_limit() -> None:
-    """Only their jerk rules them out; Ruckig then moves without jerk phases."""
+    """Without a jerk limit, trapezoids are feasible, and Ruckig moves without jerk phases."""
     robot = replace(ROBOT, limits=limits(j_max=math.inf))
     report = compare(problem(robot=robot))
     assert all(each.within_limits for each in report.values())
@@ -201,9 +201,7 @@ def test_trapezoids_pass_without_a_jerk_limit() -> None:
 
 
 def test_no_travel() -> None:
-    """Where the arm already is: those in our duration hold it there, the others are done at once
-    for nothing.
-    """
+    """Without travel, baselines in our duration hold the arm; the others are instant and free."""
     task = problem(goal=START)
     report = compare(task)
     torques, *_ = oracle(task)

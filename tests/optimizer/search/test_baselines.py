@@ -1,4 +1,4 @@
-"""The baselines' laws of motion against their textbook figures, and what is told about them."""
+"""The baselines' laws of motion against textbook figures, and the reports about baselines."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def problem(start: Array = START, goal: Array = GOAL, **given: Any) -> Problem:
 
 
 def limits(**given: float | list[float] | Array) -> Limits:
-    """The robot's limits with some replaced: one number for all joints, or one each."""
+    """The robot's limits with replacements: one number for all joints, or one per joint."""
     return replace(
         ROBOT.limits,
         **{name: np.broadcast_to(value, 6).astype(float) for name, value in given.items()},
@@ -47,7 +47,7 @@ def limits(**given: float | list[float] | Array) -> Limits:
 
 
 def one_joint(displacement: float) -> Array:
-    """A goal to which only the elbow moves."""
+    """A goal with a displacement of the elbow alone."""
     goal = START.copy()
     goal[2] -= displacement
     return goal
@@ -89,7 +89,7 @@ def test_durations(name: str) -> None:
 
 
 def test_trapezoid_in_thirds() -> None:
-    """Unless a limit objects: 1.5 Δ/T and 4.5 Δ/T²; its jerk is unbounded where a joint moves."""
+    """Without an active limit: 1.5 Δ/T and 4.5 Δ/T², with unbounded jerk at every moving joint."""
     goal = GOAL.copy()
     goal[4] = START[4]
     motion, displacement = trapezoid(ROBOT.limits, START, goal, DURATION), np.abs(goal - START)
@@ -99,8 +99,9 @@ def test_trapezoid_in_thirds() -> None:
 
 
 def test_trapezoid_keeps_to_limits_where_it_can() -> None:
-    """The blend that a limit asks for meets that limit exactly; where speed and acceleration
-    disagree, thirds stay.
+    """The blend adapts to one limit and meets it exactly.
+
+    If the limits on speed and acceleration contradict each other, the thirds stay.
     """
     goal = one_joint(1.0)
     slow = trapezoid(limits(v_max=1.2), START, goal, 1.0)

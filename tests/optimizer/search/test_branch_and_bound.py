@@ -31,7 +31,7 @@ from tests.optimizer.search.test_candidates import NARROW, candidates
 
 
 class Recorder:
-    """The real solver, and in which order it was asked for candidates."""
+    """The real solver, with a record of the candidates in the order of the calls."""
 
     def __init__(self, task: PreparedProblem) -> None:
         compile_kernel(ROBOT)
@@ -44,7 +44,7 @@ class Recorder:
         ).solve()
 
     def energy(self, candidate: Candidate) -> float:
-        """What a motion of the candidate takes, inf where none is found."""
+        """Energy of the motion of a candidate, or inf if the solver finds none."""
         attempt = self(candidate)
         return (
             np.inf
@@ -74,8 +74,10 @@ MOST = 32  # candidates solved one by one, of least bound
 
 @pytest.mark.parametrize("name", list(SMALL))
 def test_pruning_loses_nothing(name: str) -> None:
-    """Solving all candidates one by one (of the many, those of least bound) finds no better one
-    than the search.
+    """No pruned candidate is better than the answer of the search.
+
+    A solve of every pruned candidate, or of those with the least bounds if there are many, confirms
+    it.
     """
     task = PreparedProblem.of(problem(payload=PAYLOAD, gravity=TILTED, **SMALL[name]))
     found, recorder = candidates(task.problem), Recorder(task)
@@ -104,8 +106,9 @@ def test_pruning_loses_nothing(name: str) -> None:
 
 
 def test_what_was_not_reached_says_so() -> None:
-    """A clock that passes the deadline at its third reading: two candidates are visited, the rest
-    are not.
+    """At a deadline, the report of an unvisited candidate names the deadline.
+
+    The clock passes the deadline at the third reading, after two visited candidates.
     """
     task = PreparedProblem.of(
         problem(goal=tcp_pose(GOAL), objective="mechanical", duration_max=1.5)
@@ -156,8 +159,9 @@ def test_goals_that_seem_enclosed_are_tried_after_the_others(
 
 
 def test_durations_rule_candidates_out() -> None:
-    """Those that cannot be that fast are infeasible, with the least time that they take; the others
-    stay.
+    """A limit on the duration makes slow candidates infeasible and keeps the others.
+
+    The message of a slow candidate contains its least duration.
     """
     task = PreparedProblem.of(problem(goal=tcp_pose(GOAL), duration_max=1.2))
     found = candidates(task.problem)
@@ -171,8 +175,7 @@ def test_durations_rule_candidates_out() -> None:
 
 
 def test_every_candidate_is_reported() -> None:
-    """In the answer: each pair with its fate, its bound and, where solved, its energy and
-    duration."""
+    """The answer reports all candidates with status, bound and, if solved, energy and duration."""
     task = problem(goal=tcp_pose(GOAL), limits=NARROW)
     solution = optimize(task)
     assert len(solution.candidates) == len(candidates(task))

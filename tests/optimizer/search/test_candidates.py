@@ -84,7 +84,7 @@ def test_joints_to_joints_is_one_candidate() -> None:
 
 @pytest.mark.parametrize("own", [ROBOT.limits, NARROW], ids=["two turns", "one and a bit"])
 def test_windings_of_a_goal_are_complete(own: Any) -> None:
-    """Fixed start joints: the candidates are all branches with all allowed full turns, each once."""
+    """From given joints, the candidates are all branches with all allowed full turns, once."""
     task = problem(goal=tcp_pose(GOAL), limits=own)
     found = [candidate.q_goal for candidate in candidates(task)]
     expected = every_configuration(GOAL, task)

@@ -1,5 +1,6 @@
-"""Other starts: from the time-optimal motion, where path constraints hold a motion back, and from
-ends that joints reach in less time.
+"""Searches from other starts: from the time-optimal motion, and from ends with shorter durations.
+
+The first kind helps motions held back by path constraints.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ from tests.optimizer.moves import AMPLE, problem
 from tests.optimizer.search.runs import prepared
 from tests.selection import long_but
 
-# requests of the benchmark: two motions that a limit on the speed of the TCP holds back, and one
-# whose NLP costs 0.15 % less than the motion needs
+# requests of the benchmark: two motions held back by the speed limit of the TCP, and one with an
+# NLP cost 0.15 % below the motion's energy
 HELD_BACK_TO_POSE = 37
 HELD_BACK = 16
 ENDED_EARLY = 34
@@ -54,7 +55,7 @@ def refined(given: Problem) -> tuple[SearchState, Candidate]:
 
 
 def from_fastest(state: SearchState, best: Candidate) -> float:
-    """Least energy of the motions [J] to which the time-optimal motion leads."""
+    """Least energy [J] of the motions found from the time-optimal motion."""
     (interval,) = duration_intervals(state.prepared, best.q_goal)
     found = [
         in_time(state, lambda t=t: solver_of(state, best, interval).solve_from_fastest(t))
@@ -121,7 +122,7 @@ def test_a_broken_promise_starts_another_solve_between_fixed_ends_alone(slides: 
     assert (run.state.solves == solves) is slides
 
 
-# m, rad: what the certificate allows at an end
+# m, rad: the certificate's tolerance at an end
 REACHED = 1e-6
 
 

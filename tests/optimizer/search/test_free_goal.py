@@ -1,6 +1,4 @@
-"""Goals whose orientation is free in part: what they allow, what is found among it, and the bound
-on all of it.
-"""
+"""Goals with a partly free orientation: allowed poses, answers, and the bound over all poses."""
 
 from __future__ import annotations
 
@@ -105,8 +103,9 @@ def test_opposite_axes_have_a_way_back() -> None:
     ],
 )
 def test_leeway_is_the_derivative_of_forward_kinematics(pose: ConeOrientedPose) -> None:
-    """A step that its rows hold level moves neither the TCP nor, where that is fixed, its axis, to
-    first order.
+    """The leeway is the null space of the derivative of forward kinematics.
+
+    To first order, a step inside the leeway moves neither the TCP nor a fixed tool axis.
     """
     rng, step = np.random.default_rng(2), 1e-5
     task = PreparedProblem.of(problem(goal=GOAL, T_flange_tcp=TOOL, payload=PAYLOAD))
@@ -118,7 +117,7 @@ def test_leeway_is_the_derivative_of_forward_kinematics(pose: ConeOrientedPose) 
     )
     free *= step / np.linalg.norm(free)
     before, after = tcp_pose(GOAL - free, TOOL).T, tcp_pose(GOAL + free, TOOL).T
-    # central differences: what is left is of third order
+    # central differences, with an error of third order
     assert np.linalg.norm(after[:3, 3] - before[:3, 3]) < 1e-4 * step
     turned = np.linalg.norm((after - before)[:3, :3] @ pose.axis)
     assert (turned < 1e-4 * step) == (pose.half_angle == 0)
@@ -158,8 +157,9 @@ def test_a_programme_with_its_goal_unknown_has_true_derivatives() -> None:
 
 
 def test_the_solver_keeps_to_the_leeway() -> None:
-    """What it proposes lies on the plane, within the radius and within joint limits, and spends no
-    more.
+    """The solver's proposals stay on the plane, within the radius and within the joint limits.
+
+    They need no more energy.
     """
     task = PreparedProblem.of(problem(goal=GOAL))
     space, interval = bspline.uniform(13), duration_intervals(task, GOAL)[0]

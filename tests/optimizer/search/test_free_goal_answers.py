@@ -41,8 +41,7 @@ from tests.selection import long_but
 
 # the certificate's, of positions [m] and angles [rad]
 HELD = 1e-6
-# relative: a search that turns from a few samples against the best of many full poses, each with
-# its own refinement
+# relative: a search with turns from a few samples against the best of many separately refined poses
 FOUND = 5e-3
 POSITIONS = [paper_poses()[k] for k in (0, 5, 10)]
 
@@ -54,8 +53,11 @@ def energy(solution: Solution) -> float:
 @pytest.mark.long
 @pytest.mark.parametrize("number", range(3))
 def test_what_is_freer_costs_no_more(number: int) -> None:
-    """The paper's positions: free ≤ cone ≤ turned about the axis ≤ each of its five
-    orientations."""
+    """At the paper's positions, more freedom never needs more energy.
+
+    The order is: free ≤ cone ≤ turned about the axis ≤ fixed, and free ≤ the best of five
+    orientations.
+    """
     pose = POSITIONS[number]
     position, direction = pose.T[:3, 3], pose.T[:3, 2]
     about = optimize(problem(HOME, ConeOrientedPose.about(pose, [0, 0, 1])))
@@ -117,8 +119,9 @@ def test_out_of_reach_in_every_orientation() -> None:
 
 
 def test_no_sample_is_activated_after_the_deadline() -> None:
-    """Thousands of deferred samples: each batch of them is a search of its own, and none begins too
-    late.
+    """After the deadline, the search activates at most one batch of samples.
+
+    There are thousands of deferred samples, and every batch is a search of its own.
     """
     rng, clock = np.random.default_rng(2), CountingClock(0.0)
     starts = AnyOf(tuple(HOME + rng.normal(scale=0.3, size=6) for _ in range(12)))
@@ -131,8 +134,9 @@ def test_no_sample_is_activated_after_the_deadline() -> None:
 
 
 def test_mixes_with_full_targets() -> None:
-    """Joints next door win against a free orientation far away, which is nevertheless accounted
-    for.
+    """A nearby goal in joints wins against a distant free orientation.
+
+    The candidates still include the free orientation.
     """
     solution = optimize(
         problem(goal=AnyOf((ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), START + 0.02)))
@@ -167,9 +171,7 @@ def test_what_is_malformed_is_refused(make: Any, field: str) -> None:
 
 
 def test_respects_the_deadline() -> None:
-    """A free orientation from a start that is a pose itself: the answer comes a few readings after
-    the deadline.
-    """
+    """With a pose as the start too, the answer comes a few clock readings after the deadline."""
     readings = 60
     task = problem(
         tcp_pose(START), ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), deadline=float(readings)
@@ -195,7 +197,7 @@ def test_respects_the_deadline() -> None:
     ids=str,
 )
 def test_waiting_and_every_bus_count(given: dict[str, Any]) -> None:
-    """What the goal costs to hold is part of what is compared, and of the bound."""
+    """Comparison and bound include the energy for waiting at the goal."""
     T = tcp_pose(GOAL).T
     pose = ConeOrientedPose(T[:3, 3], [0, 0, 1], T[:3, 2], 0.4)
     free, full = (

@@ -1,6 +1,4 @@
-"""Least mechanical work at a fixed duration: what becomes of the candidates, and when others find
-it.
-"""
+"""Least mechanical work at a fixed duration: fates of candidates, and conditions of this search."""
 
 from __future__ import annotations
 
@@ -25,12 +23,12 @@ from tests.optimizer.search.runs import prepared
 from tests.selection import long_but
 
 DURATION = 3.0
-# share by which local optima of two searches differ
+# relative difference between local optima of two searches
 LOCAL = 0.02
 
 
 def run(**given: Any) -> Run:
-    """A search that is prepared in no time: how long that takes decides when it must end."""
+    """A search with a preparation in no time, as the preparation time affects the deadline."""
     return prepared(
         problem(goal=tcp_pose(GOAL), **{"objective": "mechanical", **fixed(DURATION)} | given),
         clock=still,
@@ -130,8 +128,9 @@ def test_guesses_rest_at_their_ends() -> None:
 
 
 def test_rough_work_is_that_of_the_motion() -> None:
-    """By few nodes and without penalties, it is nearly the exact work; and the best of each
-    candidate comes first.
+    """The rough work is nearly the exact work, and the best motion of a candidate comes first.
+
+    The rough work uses few nodes and no penalties.
     """
     own = run()
     prepared: PreparedProblem = own.state.prepared

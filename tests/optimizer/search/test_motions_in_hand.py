@@ -29,7 +29,7 @@ from tests.optimizer.moves import GOAL, PAYLOAD, START, fixed, problem
 from tests.optimizer.search.runs import prepared
 from tests.selection import long_but
 
-# relative: the error of the quadratures that are compared, `state.ENERGY_TOLERANCE`
+# relative error of the compared quadratures, `state.ENERGY_TOLERANCE`
 SLACK = 1e-6
 # s: the quintic, and motions like it, are within all limits
 SLOW = 3.0
@@ -50,7 +50,7 @@ def test_the_least_that_is_certified_is_the_answer() -> None:
     assert least_certified([Known(3.0), Known(2.0), Known(1.0, confirmed=False)]) == "2 J"
     assert least_certified([Known(1.0, confirmed=False)]) is None
     assert least_certified([]) is None
-    # what gives energy back comes first, and the first of equals counts
+    # negative energies come first; among equal energies, the first motion wins
     assert least_certified([Known(0.0), Known(-1.0)]) == "-1 J"
     first, second = Known(1.0), Known(1.0)
     assert least_certified([first, second]) == "1 J" and first is not second
@@ -61,7 +61,7 @@ def _name(spline: Spline) -> str:
 
 
 def incumbent_with(*splines: Spline) -> SearchState:
-    """The state of a search whose only candidate got these motions, one after the other."""
+    """The state of a search with one candidate, given these motions one after the other."""
     run = prepared(problem(), clock=still)
     for spline in splines:
         result = SolveResult(
@@ -106,8 +106,10 @@ def test_a_refused_candidate_takes_certified_motions_alone() -> None:
 def test_what_the_certificate_refuses_is_not_all_that_was_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """There is one candidate: without its earlier motion, which is known, there would be no
-    answer."""
+    """If the certificate refuses a motion, an earlier known motion is the answer.
+
+    There is one candidate; without the known motion there would be no answer.
+    """
     asked, known = problem(payload=PAYLOAD), quintic_spline(START, GOAL, SLOW)
     cost_of = PreparedProblem.of(asked).cost_of
     refused = list[float]()
@@ -126,7 +128,7 @@ def test_what_the_certificate_refuses_is_not_all_that_was_found(
 
 
 def own_kind(found: Solution, method: MethodName) -> list[float]:
-    """Savings against the feasible baselines that the method can represent, in our duration."""
+    """Savings against feasible baselines in our duration, of kinds within the method's space."""
     kinds = METHODS[method].accepted_baselines
     feasible = [each for each in found.baselines if each.name in kinds and each.within_limits]
     same = [each for each in feasible if each.duration == pytest.approx(found.duration)]
@@ -146,8 +148,9 @@ KINDS: dict[MethodName, tuple[str, ...]] = {
 def test_a_baseline_of_the_own_kind_is_the_answer_if_nothing_better_is_found(
     method: MethodName, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All that a method finds is what its first solve is made to find: a motion that needs more
-    than the baselines.
+    """If a method finds nothing better, a baseline from its own space is the answer.
+
+    Every solve of the method returns a motion worse than the baselines.
     """
     assert METHODS[method].accepted_baselines == KINDS[method]
     poor = _detour()
@@ -176,7 +179,10 @@ def _detour() -> Spline:
 def test_a_baseline_that_is_not_certified_in_time_is_not_feasible(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """It would be the answer: what may not be one is not said to be within the limits."""
+    """A baseline without a certificate in time is not reported as feasible.
+
+    Its energy is below the answer's, so a feasible baseline would have to be the answer.
+    """
     poor = _detour()
     for name in ("solve", "solve_from"):
         monkeypatch.setattr(

@@ -1,6 +1,4 @@
-"""Goals of free orientation: no more energy than to goals beside the start, or where another goal
-was proposed.
-"""
+"""Goals of free orientation need no more energy than nearby goals or a proposed goal."""
 
 from __future__ import annotations
 
@@ -33,9 +31,9 @@ from tests.selection import long_but
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
-# relative: two searches that end at the tolerance of their solves
+# relative difference of two searches up to the tolerance of their solves
 SAME = 2e-3
-# rad: how far a task leads, in each joint
+# rad: displacement of every joint in a task
 STEP = 0.5
 # rad: a proposal beside a goal, and how much farther its projection may be
 BESIDE = 0.05
@@ -45,9 +43,7 @@ FEW_POINTS = 1e-2
 
 
 def task(name: str, seed: int, kind: str, **given: Any) -> tuple[Problem, Array]:
-    """A problem with a goal of free orientation, and a configuration near the start that reaches
-    it.
-    """
+    """A problem with a goal of free orientation, and a goal configuration near the start."""
     arm, rng = Arm(robot=load_robot(name), collisions=False), np.random.default_rng([17, seed])
     limits = arm.active_limits
     start = rng.uniform(*np.clip([0.7 * limits.q_min, 0.7 * limits.q_max], -2.5, 2.5))
@@ -114,7 +110,7 @@ def test_without_a_free_orientation_nothing_is_activated() -> None:
 
 
 def test_a_full_pose_among_free_ones_is_searched_too() -> None:
-    """A goal far away of free orientation, and a pose next door that is held on self-motions."""
+    """A distant goal of free orientation, and a nearby full pose reached on self-motions."""
     problem, goal = task("panda", 2, "about")
     far, _ = task("panda", 5, "about")
     both = AnyOf((far.goal, Pose(tcp_pose(problem.arm, goal))))  # type: ignore[arg-type]
@@ -124,8 +120,9 @@ def test_a_full_pose_among_free_ones_is_searched_too() -> None:
 
 @pytest.mark.parametrize("name", ["xarm7", "iiwa14"])
 def test_a_proposed_goal_is_put_back_beside(name: str) -> None:
-    """A seven-joint arm holds each orientation on curves: the nearest member counts, not one of a
-    few samples.
+    """A proposed goal is projected to the nearest member of its self-motions.
+
+    A seven-joint arm reaches an orientation on curves, so a few samples are not enough.
     """
     problem, goal = task(name, 4, "about")
     run, rng = prepared(problem), np.random.default_rng(9)

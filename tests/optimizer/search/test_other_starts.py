@@ -1,6 +1,4 @@
-"""Another start for ends that slide: no worse, and better where the first motion is in a poor local
-optimum.
-"""
+"""Another start for sliding ends: never worse, and better if the first optimum is a poor one."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Goals of free orientation with a joint turned the other way around: found where that needs less
-energy.
-"""
+"""Goals of free orientation with a joint turned the other way around, if this needs less energy."""
 
 from __future__ import annotations
 
@@ -25,18 +23,18 @@ AMPLE = 300.0
 # UR5e: the second joint has 3.0 rad to go one way around, and 3.2 rad the other
 START = np.array([-0.56, 2.62, -0.15, -2.88, -1.61, 1.48])
 GOAL = np.array([-0.53, 5.82, 0.81, -1.87, -1.16, 0.96])
-# rad: a joint that goes another way is turned by far more
+# rad: far less than the difference of a joint that turns the other way
 SAME = 2e-3
-# relative: motions that nothing refines end in local optima apart, where every joint's power has a
-# corner of its own
+# relative: unrefined motions end in different local optima, due to corners in the joints' powers
 LOCAL = 3e-2
 # relative: an estimate of one duration and half the instants
 ROUGH = 0.1
 
 
 def task(**given: Any) -> Problem:
-    """A hanging arm with a heavy part, on a bus that burns what lowering it gives back: one way, it
-    is lifted less.
+    """A hanging arm with a heavy part, lifted less on one of two ways around.
+
+    The bus burns all energy from lowering the part.
     """
     payload = Payload(mass=4.3, com=np.array([0.0, 0.0, 0.05]))
     hanging, bus = np.array([0.0, 0.0, 9.81]), Bus(mode="isolated")

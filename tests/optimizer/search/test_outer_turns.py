@@ -1,5 +1,6 @@
-"""Families of candidates that differ by full turns of the outer joints: who is solved, what becomes
-of the others.
+"""Families of candidates that differ by full turns of the outer joints.
+
+A few members of the best families are solved; the rest has a status with a reason.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def asked(**given: Any) -> SearchState:
 def exploring(
     state: SearchState, energy: Callable[[Candidate], float | None]
 ) -> Callable[[], None]:
-    """An exploration that finds these energies [J]; a candidate without one collides."""
+    """An exploration with the given energies [J]; a candidate without an energy collides."""
 
     def explore() -> None:
         for each in state.candidates:
@@ -71,8 +72,9 @@ def test_families() -> None:
     "given", [{"objective": "electrical"}, {"method": "time_scaling"}, {"bound": "tight"}]
 )
 def test_no_families(given: dict[str, Any]) -> None:
-    """Every candidate is tried where bounds rule out enough, a solve takes little, or nothing shall
-    be left.
+    """The search tries every candidate if bounds prune enough or solves are cheap.
+
+    With a tight bound, no candidate may be left out either.
     """
     state = asked(**given)
     explore_families(state, exploring(state, lambda each: each.lower_bound + 1.0))
@@ -80,9 +82,7 @@ def test_no_families(given: dict[str, Any]) -> None:
 
 
 def test_best_families_are_solved() -> None:
-    """Others are left, and no solved member is worth less than one that its family would have let
-    by.
-    """
+    """The search solves more members of the best families, and one member of every other family."""
     state = asked()
     families = families_of(state)
     rank = {each: k for k, family in enumerate(families) for each in family}

@@ -42,23 +42,23 @@ REFINED = 1e-3
 ROUNDING = 1e-12
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
-# least share by which the copper loss of holding raises one of a few bounds, and how many of them
-# are solved
+# least share by which the copper loss of holding raises at least one bound, and number of tasks to
+# solve
 RAISED = 0.01
 SOLVED = 2
-# start and goal [rad] of an xarm7: a curve of the goal's pose that needs little passes half a turn;
-# the share by which its bound is raised: 0.031, or 0.011 with wide boxes
+# start and goal [rad] of an xarm7, with a good curve of the goal passing half a turn; the bound
+# rises by a share of 0.031, or 0.011 with wide boxes
 PASSING = np.array(
     [[5.88, -0.49, 3.3, 2.46, 4.1, 1.22, -4.77], [1.06, 0.64, 2.12, 1.79, 3.32, -0.01, -3.04]]
 )
 PASSING_RAISED = 0.02
-# m that links keep from each other at the ends of a task
+# least distance of links from each other at the ends of a task [m]
 CLEAR = 0.01
 
 
 @cache
 def tasks(name: str, count: int) -> list[tuple[Array, Array]]:
-    """Start and goal configurations in which no links meet, drawn at random."""
+    """Random start and goal configurations without contact between links."""
     robot = load_robot(name)
     drawn = np.random.default_rng(61).uniform(
         robot.limits.q_min, robot.limits.q_max, (4 * count + 8, robot.nq)
@@ -145,7 +145,7 @@ def test_optima_that_samples_hardly_show_are_found(
 def test_no_member_has_a_lower_bound_below_the_curves(
     name: str, at_start: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Both without the copper loss of holding, which the bound of a pair does not have."""
+    """Both bounds exclude the copper loss of holding, since the bound of a pair has none."""
     monkeypatch.setattr(HoldingCells, "of", lambda prepared: None)
     robot = load_robot(name)
     for start, goal in tasks(name, 3):
@@ -195,7 +195,10 @@ def test_holding_raises_the_bound_of_curves_and_no_motion_spends_less(
 def test_a_curve_whose_angles_pass_half_a_turn_is_raised_too(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """There the angles of neighbours differ by a full turn, which must not widen their box."""
+    """Holding raises the bound of a curve with angles past half a turn.
+
+    The angles of neighbours on this curve differ by a full turn, without an effect on their box.
+    """
     robot = load_robot("xarm7")
     posed = asked(robot, PASSING[0], pose_of(robot, PASSING[1]))
     plain, held = plain_and_held(posed, monkeypatch)
@@ -206,7 +209,7 @@ def test_a_curve_whose_angles_pass_half_a_turn_is_raised_too(
 ROBOT = load_robot("panda")
 AT_HOME = np.array([0, -0.785, 0, -2.356, 0, 1.571, 0.785])
 T_NARROW = tcp_pose(Arm(robot=ROBOT), np.array([[0.3, 0.4, -0.2, -1.9, 0.3, 2.2, 0.6]]))[0]
-# found by a search for balls that all coarse samples touch and some others do not
+# balls in contact with every coarse sample but not with all other members, found by a search
 BALLS = ([0.354, -0.104, 0.443], [0.559, 0.103, 0.41], [0.103, -0.2, 0.289], [0.023, -0.154, 0.3])
 
 
@@ -244,7 +247,7 @@ def test_a_posture_between_colliding_samples_is_found(end: str) -> None:
 
 @pytest.mark.parametrize(("end", "error"), [("start", StartInCollision), ("goal", GoalInCollision)])
 def test_a_pose_without_a_free_posture_is_refused(end: str, error: type[Exception]) -> None:
-    """A ball in the flange, which does not move along the self-motion."""
+    """A ball encloses the flange, a fixed point of the self-motion."""
     arm = among(*BALLS, T_NARROW[:3, 3].tolist())
     ends: dict[str, Any] = {"start": AT_HOME, "goal": AT_HOME, end: Pose(T_NARROW)}
     with pytest.raises(error):

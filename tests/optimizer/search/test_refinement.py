@@ -27,15 +27,14 @@ from tests.optimizer.clocks import still
 from tests.optimizer.moves import AMPLE, PAYLOAD, ROBOT, fixed, problem, tcp_pose
 from tests.optimizer.search.runs import prepared
 
-# relative: a spline of Ruckig's motion is slower than the motion where jumps of its jerk are close
+# relative: a spline is slower than its original motion by Ruckig if jumps of jerk are close
 MERGED = 2e-5
 # relative: solves of one optimum end this far apart
 SCATTER = 1e-3
-# relative: half of what another goal saves, since optima depend on the processor
+# relative: half of the saving of another goal, since optima depend on the processor
 SAVED = 6e-4
 ELBOW_UP = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
-# jumps of jerk of this motion of Ruckig's are so close that its jerk as a spline is 6e-6 beyond the
-# limit
+# a motion by Ruckig with jumps of jerk so close that its spline exceeds the jerk limit by 6e-6
 CLOSE_JUMPS = np.array(
     [
         [
@@ -67,8 +66,10 @@ def test_a_better_baseline_is_taken_even_if_rounding_breaks_a_limit() -> None:
 
 
 def test_the_goal_moves_once_more_after_the_refinement(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The refined motion touches other limits than the coarse motion for which the goal was chosen,
-    and another goal saves 0.13 % here.
+    """The search adjusts a free goal once more after the refinement of the motion.
+
+    The refined motion touches other limits than the coarse motion did, and another goal saves 0.13
+    %.
     """
     rng = np.random.default_rng(13)
     q_start, q_goal = ELBOW_UP + rng.uniform(-0.8, 0.8, (2, 6))
@@ -84,8 +85,10 @@ def test_the_goal_moves_once_more_after_the_refinement(monkeypatch: pytest.Monke
 
 @pytest.mark.long
 def test_no_motion_of_near_duration_stores_more_to_advantage() -> None:
-    """Where the storage just takes all surplus, the best motion needs the value of a joule of
-    surplus to be nearly the highest: coarser values left 1.6 % here.
+    """The answer stores as much to advantage as any motion of a similar duration.
+
+    The storage just takes all surplus. The value of a joule of surplus in the best motion is then
+    nearly the highest one: coarser values cost 1.6 % here.
     """
     rng = np.random.default_rng(0)
     q_start, q_goal = ELBOW_UP + rng.uniform(-0.8, 0.8, (2, 6))
@@ -104,9 +107,9 @@ def test_no_motion_of_near_duration_stores_more_to_advantage() -> None:
     assert within.energy.electrical.total > least
 
 
-# relative; what is promised against the best of many starts on as many control points
+# relative; promised against the best of many starts with as many control points
 PROMISED = 5e-3
-# a motion in a given time [s], and the least mechanical energy [J] that is known of it
+# a motion in a given time [s], and its least known mechanical energy [J]
 BEST_START = np.array(
     [-1.0563769171, 0.7030631375, 0.0479574165, -2.1595422481, 1.9102876515, -3.0230673183]
 )
@@ -118,7 +121,7 @@ BEST_ENERGY = 44.05294296
 
 
 def explored(**given: Any) -> SearchState:
-    """A search whose candidates are solved, but not refined."""
+    """A search with solved but unrefined candidates."""
     run = prepared(problem(**given))
     state = run.state
     explore(
@@ -160,7 +163,7 @@ def test_sharper_corners_need_less(given: dict[str, Any]) -> None:
     after = state.best()
     assert after is not None and after.energy is not None
     assert after.energy < energy
-    # the candidate's energy is that of its motion, by the exact formulas
+    # the candidate's energy is the energy of its motion by the exact formulas
     prepared: PreparedProblem = state.prepared
     assert after.energy == prepared.objective_of(prepared.energy(after.spline))
 
@@ -188,13 +191,13 @@ def test_no_time_is_left() -> None:
     assert best.spline is spline
 
 
-# request of the benchmark in which a heavy payload descends: 280 J flow, 7 J are drawn on balance
+# request of the benchmark with a heavy payload going down: 280 J flow for a net use of 7 J
 DESCENT = 13
 SHORTER = 0.97
 
 
 def descent() -> Problem:
-    """The request, its goal as the configuration that its answer reaches."""
+    """The request, with the goal configuration of its answer as the goal."""
     given = to_problem(OptimizeRequest.model_validate(request(0, DESCENT)[1]), AMPLE)
     run = prepared(given)
     nearest = min(run.state.candidates, key=lambda each: each.shortest)

@@ -1,6 +1,4 @@
-"""Seeds of redundant arms: where the estimated energy is least along the self-motions; ends slide
-from there.
-"""
+"""Seeds of redundant arms are at the least estimated energies of self-motions; ends then slide."""
 
 from __future__ import annotations
 
@@ -27,12 +25,11 @@ from tests.selection import long_but
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
-# an estimate is that of a motion of two numbers: it is above the least energy, by less than this
-# ratio
+# largest ratio of an estimate to the least energy; estimates are motions with two parameters
 HIGHEST = 1.4
 # m, rad
 HELD = 1e-9
-# s: several times what the motion takes by itself
+# s: several times the best duration
 SLOW = 8.0
 # relative: an estimate is a quadrature of a few points, of smoothed friction and corners
 FEW_POINTS = 1e-2
@@ -77,8 +74,9 @@ def test_estimates_are_of_motions_in_the_time_that_is_asked_for() -> None:
 
 @pytest.mark.long
 def test_of_work_more_is_tried_than_what_the_straight_line_says() -> None:
-    """A posture that needs much more than others on a straight line, and less than these on the
-    best motion.
+    """For mechanical work, the search also tries postures with a costly straight line.
+
+    Such a posture may need less than others on its best motion.
     """
     robot, rng = load_robot("panda"), np.random.default_rng([77, 0])
     arm, start, goal = Arm(robot=robot), collision_free(rng, robot), collision_free(rng, robot)

@@ -1,4 +1,4 @@
-"""Poses on singularities: no configuration of them needs less than the answer or the bound."""
+"""Poses on singularities: no configuration of the pose needs less than the answer or the bound."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def energy(solution: Solution) -> float:
 
 
 def curves(q: Array) -> list[SelfMotion]:
-    """The self-motions that hold the pose of a configuration."""
+    """The self-motions at the pose of a configuration."""
     found = required_inverse_kinematics(ROBOT, "goal").solve(tcp_pose(q).T, windings=False)
     return list(
         {
@@ -75,7 +75,7 @@ def test_a_pose_needs_no_more_than_its_configuration(goal: Array) -> None:
 @pytest.mark.parametrize("count", long_but((4,), (4, 7)))
 def test_the_answer_is_the_best_of_the_curve(count: int) -> None:
     answer = solved(START, tcp_pose(STRETCHED))
-    # what is solved is a sample: whether another is better is not proven
+    # the solved configurations are samples, so the optimum is not proven
     assert answer.status == "feasible"
     for motion in curves(STRETCHED):
         lower, upper = motion.arcs[0]
@@ -90,8 +90,10 @@ def test_the_answer_is_the_best_of_the_curve(count: int) -> None:
 
 @pytest.mark.parametrize("joint", long_but([4], [2, 4]))
 def test_answers_next_to_a_singularity_are_those_beside_them(joint: int) -> None:
-    """The elbow's also those on it. On the wrist's, more configurations reach the pose, and the
-    answer may be less.
+    """Answers near a singularity agree with each other.
+
+    On the singularity of the elbow, the answer agrees too. On the singularity of the wrist, more
+    configurations reach the pose, and the answer may need less.
     """
     energies = []
     for away in (0.0, 1e-9, 1e-8, 1e-7, 1e-5, 1e-3):
@@ -123,7 +125,7 @@ def test_a_branch_may_be_asked_for_on_its_singularity() -> None:
 
 
 def test_a_free_turn_about_the_last_axis_may_meet_a_stretched_wrist() -> None:
-    """The wrist is stretched in each of the allowed orientations."""
+    """The wrist is stretched in all allowed orientations."""
     pose = ConeOrientedPose.about(tcp_pose(STRETCHED), np.array([0.0, 0.0, 1.0]))
     answer = solved(START, pose)
     assert energy(answer) <= energy(solved(START, tcp_pose(STRETCHED))) * (1 + REFINED)
@@ -141,7 +143,7 @@ def answer(goal: Array | Pose) -> Solution:
 
 @pytest.mark.parametrize("every", long_but((False,), (False, True)))
 def test_no_member_needs_less(every: bool) -> None:
-    """Three members beside the answer's, or 24 of each position of the arm."""
+    """The answer beats three nearby members, or 24 members per position of the arm."""
     found = answer(Pose(flange(KUKA, ALIGNED)))
     energy = found.energy.electrical.total
     assert found.certificate.valid and found.complete and found.lower_bound <= energy

@@ -1,5 +1,6 @@
-"""Least mechanical work of an arm with seven joints: ends slide up to the last solve, and no motion
-is lost whose end is on a joint limit.
+"""Least mechanical work of a seven-joint arm: ends slide up to the last solve.
+
+Motions with an end on a joint limit are kept.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ ARM = Arm(robot=load_robot("panda"), collisions=False)
 START = np.array([0.3, 0.4, -0.5, -1.6, 0.7, 1.9, 0.4])
 GOAL = np.array([-0.6, 0.8, 0.4, -1.1, 0.2, 1.5, -0.5])
 DURATION = 1.6
-# a motion in a given time [s], and the least work [J] that is known of it
+# a motion in a given time [s], and its least known work [J]
 BEST_START = np.array([-0.7409, 0.2653, -1.9028, -1.9881, 0.2075, 0.1431, 0.9865])
 BEST_GOAL = np.array([0.7247, -1.6752, -2.0039, -1.5995, -0.8184, 2.1719, -2.6627])
 BEST_DURATION = 1.644
 BEST_WORK = 33.64066
-# relative; what is promised against the least work known
+# relative; promised against the least known work
 PROMISED = 5e-3
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
@@ -46,7 +47,7 @@ def problem(goal: Array = GOAL, **given: Any) -> Problem:
 
 @pytest.fixture
 def compiled() -> None:
-    """Kernels that do not have to be interpreted, for searches with coarse motions."""
+    """Compiled kernels, for searches with coarse motions."""
     with with_compiler():
         compile_kernel(ARM.robot)
 

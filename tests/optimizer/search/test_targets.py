@@ -1,6 +1,4 @@
-"""Several targets: the best of them is taken, the others are accounted for, and what is no list is
-refused.
-"""
+"""Goals with several targets: the best one wins, and the answer reports on all others."""
 
 from __future__ import annotations
 
@@ -20,7 +18,7 @@ from tests.selection import long_but
 # relative: in a search of its own every target's winner is refined over more control points, in a
 # common one only the best of all, and refining gains some tenths of a percent
 REFINEMENT = 5e-3
-# relative; what a solver that stops where a step promises 5e-5 of the cost may leave behind, twice
+# relative; twice the possible loss of a solver that stops at a promised gain of 5e-5 of the cost
 CONVERGED = 1e-3
 FAR = Pose(
     np.block([[np.eye(3), np.array([[2.0], [0.0], [0.3]])], [np.zeros((1, 3)), np.ones((1, 1))]])
@@ -30,8 +28,9 @@ BEYOND = np.array([0.0, -1.57, 3.5, -1.57, -1.57, 0.0])
 
 @pytest.mark.parametrize("position", long_but(range(1), range(3)))
 def test_the_papers_orientations_are_one_request(position: int) -> None:
-    """Its five orientations at a position: no worse than the best of five requests, and it says
-    which that is.
+    """One request with the paper's five orientations equals the best of five requests.
+
+    The answer names the reached orientation.
     """
     poses = paper_poses()[5 * position : 5 * position + 5]
     solution = optimize(problem(HOME, AnyOf(tuple(poses))))
@@ -56,8 +55,9 @@ def test_one_of_one_is_that_one() -> None:
 
 
 def test_both_ends_may_be_any_of_several() -> None:
-    """Joints and poses mixed, the cheapest pair last: staying where a start and a goal are the
-    same.
+    """Both ends may be lists that mix joints and poses.
+
+    The cheapest pair comes last: it stays at a start that nearly equals a goal.
     """
     other = START + 1.0
     solution = optimize(

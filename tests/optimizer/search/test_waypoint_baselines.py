@@ -1,5 +1,6 @@
-"""Baselines along planned paths and tool paths, where the usual ones hit an obstacle or are too
-fast.
+"""Baselines along planned paths and tool paths, for problems with few feasible standard baselines.
+
+The standard baselines hit an obstacle or are too fast.
 """
 
 from __future__ import annotations
@@ -64,7 +65,10 @@ def compared(task: Problem) -> dict[str, Baseline]:
 
 
 def test_around_a_post_two_ways_keep_every_limit() -> None:
-    """What is shorter waits for the longer one, so that each saving is of the same time."""
+    """Around a post, both waypoint baselines keep every limit.
+
+    The shorter motion waits until the end of the longer one, so every saving compares equal times.
+    """
     task = example("over_a_post")
     answer = optimize(task, progress=False)
     ways = [each for each in answer.baselines if each.within_limits]
@@ -140,7 +144,10 @@ def test_a_motion_without_rest_uses_a_limit_and_keeps_them_all() -> None:
 
 
 def test_a_cycle_past_an_obstacle_has_ways_in_times_of_their_own() -> None:
-    """There and back around the post: each way is the sum of its moves and the rests."""
+    """A cycle past an obstacle has waypoint baselines with durations of their own.
+
+    The cycle goes around the post and back; time and energy are sums over the moves and the rests.
+    """
     task = example("over_a_post")
     cycle = Cycle(
         arm=task.arm,
@@ -176,7 +183,7 @@ SMOOTHED = 2e-3  # relative; corners of a law of time that splines round
 
 
 def test_two_ways_along_a_line_keep_every_limit() -> None:
-    """In a given time they are those of a tool that moves along the line by the same laws."""
+    """In a given time, the baselines are motions of the tool along the line by the same laws."""
     duration, tau = 1.7, np.linspace(0.0, 1.0, 200)
     task = along(moved([0.0, 0.3, 0.0]), duration_min=duration, duration_max=duration)
     found, prepared = optimize(task), PreparedProblem.of(task)
@@ -198,7 +205,7 @@ def test_two_ways_along_a_line_keep_every_limit() -> None:
 
 
 def test_they_take_no_longer_than_allowed() -> None:
-    """In a free time our motion waits for them; without time for them, there are none."""
+    """In a free time, our motion waits for the baselines; without enough time, none is computed."""
     task = along(moved([0.0, 0.3, 0.0]))
     found = optimize(task)
     power = standing(ARM, found.goal.q, PreparedProblem.of(task).torques).power
