@@ -34,7 +34,7 @@ RADIUS = 1e-3  # m
     ("beyond", "of_hull", "of_mesh"), [(-RADIUS / 2, True, True), (1.5e-3, True, False)]
 )
 def test_an_obstacle_at_the_surface_of_a_link(beyond: float, of_hull: bool, of_mesh: bool) -> None:
-    """A pea beside the forearm: in touch with the mesh, or only with the hull, which is grown."""
+    """A pea beside the forearm, in contact with the mesh, or only with the enlarged hull."""
     surfaces = list(link_surfaces(meshes("ur5e"), "ur5e", LINK).values())
     corners = np.concatenate(surfaces).reshape(-1, 3)
     farthest = corners[corners[:, 2].argmax()]
@@ -86,7 +86,7 @@ def ball(radius: float) -> Array:
 
 
 def test_the_excess_is_the_distance_between_the_surfaces() -> None:
-    """A ball of 50 mm within a concentric one of 55 mm, and within a cube that is grown by 5 mm."""
+    """A ball of 50 mm within a concentric one of 55 mm, and within a cube enlarged by 5 mm."""
     mesh, rng = ball(0.05), np.random.default_rng(1)
     found = beyond([LinkCapsule(1, np.zeros((2, 3)), 0.055)], [mesh], rng)
     assert found == pytest.approx(np.full(len(found), 5e-3), abs=SAMPLED)
@@ -97,7 +97,7 @@ def test_the_excess_is_the_distance_between_the_surfaces() -> None:
 
 
 def test_what_another_cover_contains_is_no_excess() -> None:
-    """Of two equal balls side by side, each hides a part of the other."""
+    """Two equal balls side by side: either one hides a part of the other."""
     ends = [np.tile([x, 0.0, 0.0], (2, 1)) for x in (-0.02, 0.02)]
     covers = [LinkCapsule(1, end, 0.055) for end in ends]
     found = beyond(covers, [ball(0.05)], np.random.default_rng(1))
@@ -130,8 +130,8 @@ def test_the_hulls_of_an_arm_or_tool_are_proven_and_within_the_limits(
 
 
 def test_points_within_a_neighbour_at_every_angle_are_no_excess() -> None:
-    """A ball around the origin of the next link's joint hides what lies on this joint's axis, and
-    not what lies beside its reach at any angle.
+    """A ball around the origin of the next link's joint hides points on this joint's axis, but not
+    points beyond its reach at every angle.
     """
     robot = load_robot("ur5e")
     joint = robot.model.jointPlacements[3]

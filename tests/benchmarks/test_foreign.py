@@ -22,7 +22,9 @@ AMPLE = 60.0  # s
 
 
 def written(folder: Path, families: tuple[str, ...] = ("posts",)) -> Path:
-    """A file with a problem of each family: a joint goal that is near, and the pose of another."""
+    """A file of problems of each family, with a near joint goal and the pose of another
+    configuration.
+    """
     upright: Any = {**POST["pose"], "quaternion": [0.0, 0.0, 0.0, 1.0]}  # type: ignore[dict-item]
     problem = {
         "start": START,

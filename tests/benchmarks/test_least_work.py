@@ -1,4 +1,4 @@
-"""The work of a motion, and the table over problems of which not every motion is found."""
+"""The work of a motion, and the table over problems with missing motions."""
 
 from __future__ import annotations
 

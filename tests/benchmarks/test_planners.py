@@ -24,7 +24,7 @@ from tests.selection import long_but
 OPTIONAL = {"drake": "pydrake", "copp": "copp_py"}
 ENDS = 1e-6  # rad
 SLACK = 1e-3  # by which limits may be exceeded
-# sum of energy's parts against the total: what makes a replay's speeds and torques fit together
+# of the sum of the energy's parts against the total: speeds and torques of a replay are consistent
 IDENTITY = 1e-3
 # toppra knows no jerk; bounds on a grid are broken between its points
 HOLDING = [name for name in PLANNERS if name not in ("toppra", "opti-grid")]

@@ -84,7 +84,7 @@ def test_rounding_is_no_difference() -> None:
 
 def test_references_are_of_the_robots_figures() -> None:
     robot = load_robot("ur5e")
-    # what is computed from figures, and kept with them, is none
+    # values computed from figures, and cached with them, are not part of the fingerprint
     assert robot.limits.rates.shape == (3, 6)
     assert load()["fingerprint"] == fingerprint(robot)
 

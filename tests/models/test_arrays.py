@@ -1,4 +1,4 @@
-"""The check of arrays: what passes is a read-only copy, what does not is named."""
+"""The check of arrays: valid ones become read-only copies, errors name invalid ones."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What capsules hold: the proof over whole triangles against points of surfaces, and robots against
-their meshes.
+"""Containment in capsules: the proof over whole triangles against sampled surface points, and
+robots against their meshes.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def test_capsules_hold_every_surface(robot: Robot, link: int, kind: str) -> None
     surface = link_surfaces(meshes(robot.name), robot.name, link)[kind]
     assert len(surface) > 100
     assert not len(not_held(surface, capsules))
-    # the same by points of the surfaces, and the test would see a radius that is 2 mm too small
+    # the same with points of the surfaces, precise enough to detect a radius 2 mm too small
     points = sampled(surface, 20_000, np.random.default_rng(3))
     assert outside(points, capsules).min(axis=0).max() <= ROUNDING
 
@@ -60,7 +60,7 @@ def test_capsules_hold_every_surface(robot: Robot, link: int, kind: str) -> None
     ids=label,
 )
 def test_no_capsule_is_idle(robot: Robot, number: int) -> None:
-    """Each holds some of a surface alone: 2 mm less of any radius, and a surface is outside."""
+    """Every capsule is needed: with any radius 2 mm smaller, a part of a surface is outside."""
     own = robot.capsules[number]
     others = [each for each in robot.capsules if each.link == own.link and each is not own]
     smaller = LinkCapsule(own.link, own.axis, own.radius - 2e-3)
@@ -87,7 +87,7 @@ def test_a_triangle_over_several_capsules_is_held() -> None:
 
 
 def test_a_gap_below_the_resolution_is_found() -> None:
-    """Two balls that miss each other by less than SMALLEST: a piece over the gap is never held."""
+    """Two balls with a gap smaller than SMALLEST: a piece over the gap is never contained."""
     balls = [
         capsule([s * (0.1 + SMALLEST / 4), 0, 0], [s * (0.1 + SMALLEST / 4), 0, 0], 0.1)
         for s in (-1, 1)
@@ -96,8 +96,8 @@ def test_a_gap_below_the_resolution_is_found() -> None:
 
 
 def test_what_is_held_has_no_point_outside() -> None:
-    """Random capsules and triangles: the proof and dense samples agree; what is not held is outside
-    or on the rim.
+    """Random capsules and triangles: the proof agrees with dense samples; triangles without a proof
+    are outside or on the rim.
     """
     rng = np.random.default_rng(8)
     held = 0

@@ -1,5 +1,5 @@
-"""Figures without a source follow the rules that their notes state, and tensors are those of arms
-that can be built.
+"""Figures without a source follow the rules stated in their notes, and inertia tensors belong to
+arms that can be built.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ LARGEST = ("ur15", "ur20", "ur30")
 
 
 def robots(section: str, part: str) -> list[str]:
-    """Names of the robots of one maker of which a figure has no source: the rules are from that
-    maker's joints.
+    """Names of the robots with a figure without a source, by one maker: the rules use this maker's
+    joints.
     """
     return [
         name for name in OF_ONE_MAKER if load_robot(name).figures[section][part]["trust"] == "E"
@@ -84,8 +84,8 @@ def test_every_tensor_is_that_of_a_body(name: str) -> None:
 
 
 def rings(robot: Robot, joint: int) -> tuple[int, Array]:
-    """The link before a joint whose axis meets the one before, and circles around both axes where
-    they meet [m].
+    """The link before a joint whose axis meets the previous one, and circles around both axes at
+    their intersection [m].
     """
     radii = RADIUS * (robot.limits.tau_max[joint - 1 : joint + 1] / 9) ** 0.241
     angle = np.linspace(0, 2 * np.pi, 72)

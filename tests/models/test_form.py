@@ -1,4 +1,4 @@
-"""The form in which arms are drawn, where the collision capsules are; and pictures from the makers'
+"""The drawn form of an arm lies at its collision capsules; pictures are drawn from the makers'
 meshes.
 """
 
@@ -45,7 +45,7 @@ def test_housings_meet_on_the_axis_of_each_joint(name: str) -> None:
         (ring,) = (body for body in bodies[joint] if body.kind == "ring")
         middle = (np.array(ring.start) + ring.end) / 2
         assert T.actInv(middle)[:2] == pytest.approx(0, abs=ROUNDING), "on the axis"
-        # in the frame of the next link, whose own housing begins there
+        # in the frame of the next link, at the start of its own housing
         ends = [T.act(np.array(body.start)) for body in bodies[joint + 1] if body.kind == "housing"]
         assert min(np.linalg.norm(end - middle) for end in ends) == pytest.approx(0, abs=ROUNDING)
 
@@ -71,7 +71,7 @@ def test_what_is_drawn_is_where_collision_checks_see_the_arm(name: str) -> None:
 MOST = 400_000  # byte, compressed
 # m; positions are rounded
 ROUNDED = 6e-5
-# m; where faces are taken away, the surface moves
+# m; the surface moves at removed faces
 MOVED = 5e-3
 
 

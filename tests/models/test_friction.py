@@ -1,4 +1,4 @@
-"""Friction laws against the table that they were fitted to."""
+"""Friction laws against their source table."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, FrictionLaw, Robot
 from tests.selection import long_but
 
-# worst relative error over the table that a user may rely on
+# worst relative error over the table, promised to users
 WORST_ERROR = {"curved": 0.05, "coulomb_viscous": 0.18}
 # of a coefficient, when another build of the linear programming solver fits it again
 REFIT = 1e-3

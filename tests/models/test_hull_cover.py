@@ -99,7 +99,7 @@ def test_a_fit_ends_where_too_many_points_are_needed() -> None:
 def test_flat_points_have_a_hull_with_a_volume(
     extent: tuple[float, ...], turn: tuple[float, float, float]
 ) -> None:
-    """As parts of a sheet, a wire and the like, also if only their rounding makes them flat."""
+    """Like parts of a sheet or a wire, also if they are flat only by rounding."""
     points = np.random.default_rng(0).uniform(-0.1, 0.1, (20, 3)) * extent @ rpyToMatrix(*turn).T
     chosen = hull_around(points)
     assert ConvexHull(chosen).volume > 0
@@ -211,7 +211,7 @@ def test_more_parts_than_allowed_are_not_made() -> None:
 
 
 def test_what_needs_no_division_is_one_part() -> None:
-    """A convex body, and a bent one where no obstacle can be."""
+    """A convex body, and a bent one with a bend out of reach of obstacles."""
     assert len(divided([box((0, 0, 0), (0.05, 0.015, 0.015))], RADIUS, nowhere)) == 1
     assert len(divided([BENT], RADIUS, everywhere)) == 1
 

@@ -17,7 +17,7 @@ from tests.by_pinocchio import flange
 from tests.models.own_arm.arms import RICH_ARM, URDF, changed, robot
 from tests.selection import long_but
 
-# N·m: rounding of torques of some 500 N·m, and of inertias that MuJoCo would refuse
+# N·m: rounding of torques of some 500 N·m, and the effect of inertias adjusted for MuJoCo
 TORQUE = 1e-9
 MENDED = 0.02
 NAMES = ("ur5e", "panda", "ur30")
@@ -65,8 +65,8 @@ def test_friction_is_that_of_the_law(arm: Robot) -> None:
 
 
 def test_links_meet_as_in_the_collision_model() -> None:
-    """Of an arm above a wide plate, whose capsule would meet the forearm everywhere. The hulls in
-    the file reach up to 2 mm further.
+    """An arm above a wide plate: a capsule around the plate would touch the forearm everywhere. The
+    hulls in the file extend up to 2 mm further.
     """
     plate = '<collision><geometry><box size="1.5 1.5 0.02"/></geometry></collision>'
     rod = '<collision><origin xyz="0 0 0.15"/><geometry>{}</geometry></collision>'

@@ -25,13 +25,13 @@ from tests.mesh_folders import meshes as arm_folder
 
 # double precision over a product of seven matrices of entries about 1
 ROUNDING = 1e-14
-# the same over angles that are rounded to nine digits, and lengths of about 1 m; and of limits
-# written as 3.14
+# the same for angles rounded to nine digits and lengths of about 1 m, and for limits written as
+# 3.14
 NINE_DIGITS = 1e-8
 THREE_DIGITS = 1e-3
 # the same relative to torques of up to 150 N·m
 TORQUE_ROUNDING = 1e-11
-# kg, of the moving links together, by the maker's list of each arm
+# kg, of all moving links together, by the maker's list for the arm
 MASSES = {
     "gen3": 1.3773 + 1.1636 + 1.1636 + 0.9302 + 0.6781 + 0.6781 + 0.364,
     "xarm7": 2.382 + 1.869 + 1.6383 + 1.7269 + 1.3203 + 1.325 + 0.17,
@@ -63,7 +63,7 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 
 
 def flange_by_origins(q: Array, kinematics: dict[str, Any]) -> Array:
-    """T_base_flange (4, 4) by the origins of the joints, each turning about its z axis."""
+    """T_base_flange (4, 4) by the origins of the joints, with rotation about their z axes."""
     T = np.eye(4)
     origins = [*kinematics["joint_origin"]["value"], kinematics["flange_origin"]["value"]]
     for origin, angle in zip(origins, [*q, 0.0], strict=True):
@@ -158,8 +158,7 @@ TABLES = {"dh_a": dh_flange, "modified_dh_a": craig_flange}
 
 
 def test_forward_kinematics_is_that_of_the_figures(robot: Robot) -> None:
-    """By the origins of the joints, and by the Denavit-Hartenberg table where the maker gives
-    one."""
+    """By the origins of the joints, and by the maker's Denavit-Hartenberg table if there is one."""
     kinematics = robot.figures["kinematics"]
     ways = [flange_by_origins, *(way for key, way in TABLES.items() if key in kinematics)]
     for q in configurations(robot.nq):
@@ -260,7 +259,7 @@ def test_figures_of_another_number_of_joints_are_refused(part: str) -> None:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_kinematics_and_limits_are_those_of_a_urdf_of_others(name: str) -> None:
-    """The maker's description as another package has it, whose numbers are rounded."""
+    """The maker's description in another package, with rounded numbers."""
     robot, model = load_robot(name), pin.buildModelFromUrdf(str(arm_folder(name) / f"{name}.urdf"))
     assert model.lowerPositionLimit == pytest.approx(robot.limits.q_min, rel=THREE_DIGITS)
     assert model.upperPositionLimit == pytest.approx(robot.limits.q_max, rel=THREE_DIGITS)

@@ -12,7 +12,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "reference" / "robots.md"
 
 
 def columns(name: str) -> dict[str, Any]:
-    """The figures that each column of the table is about."""
+    """The figures behind each column of the table."""
     figures = load_figures(name)
     inertials, drives = figures["inertials"], figures["drives"]
     return {

@@ -1,6 +1,4 @@
-"""Figures of tools: every one has a source or says that it has none, and together they are bodies
-that can be built.
-"""
+"""Figures of tools have a source or state its absence; together they describe possible bodies."""
 
 from __future__ import annotations
 
@@ -37,7 +35,7 @@ BETWEEN_FINGERS = 0.06
 CONFIGURATIONS = 20
 # m: edge of a small obstacle
 CUBE = 2e-3
-# m: a distance that the capsules do not allow
+# m: a distance excluded by the capsules
 NEAR = 2e-3
 # m: the nearest point of the fingers is some millimetres beside the axis of the flange
 FLAT_TIP = 5e-4
@@ -86,7 +84,7 @@ def test_a_tool_leaves_the_arm_room_to_move(name: str, robot: str) -> None:
     def free(model: CollisionModel) -> int:
         return sum(model.least_distance(each[None], 1.0) > 0 for each in q)
 
-    # a tool that touched the link before the last would leave none
+    # a tool in contact with the link before the last would leave no free configuration
     assert free(CollisionModel(arm)) > free(CollisionModel(Arm(robot=arm.robot))) / 2
 
 
@@ -186,7 +184,7 @@ def test_a_thing_beside_a_gripper_is_free(name: str, beside: list[float]) -> Non
 @pytest.mark.parametrize(
     ("name", "place"),
     [
-        # the joints and the tips of the open fingers, and the tips of the closed ones
+        # the joints, and the tips of the open and of the closed fingers
         ("robotiq_2f_85", [0.0, 0.074, 0.1087]),
         ("robotiq_2f_85", [0.0, 0.0445, 0.158]),
         ("robotiq_2f_85", [0.0, -0.003, 0.173]),

@@ -1,4 +1,4 @@
-"""Serial chains of any number of revolute joints, made by numpy: no arm that anybody sells."""
+"""Serial chains of any number of revolute joints, made by numpy: not commercial arms."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ MASS = 1.6
 
 
 def serial_chain(nq: int, capsules: bool = True) -> Robot:
-    """A chain whose axes stand at right angles in turn, or nearly so, with the strongest joints at
-    its base.
+    """A chain with alternately perpendicular axes, exactly or nearly, and with the strongest joints
+    at the base.
     """
     rng = np.random.default_rng(nq)
     model = pin.Model()
@@ -71,16 +71,17 @@ def serial_chain(nq: int, capsules: bool = True) -> Robot:
 
 
 def _capsules(model: pin.Model) -> tuple[LinkCapsule, ...]:
-    """One around each link, from its joint to the next one's or to the flange."""
+    """One capsule around every link, from its joint to the next joint or to the flange."""
     flange = model.frames[model.getFrameId("flange")].placement.translation
     ends = [placement.translation for placement in list(model.jointPlacements)[1:]] + [flange]
-    # short of the joints at both ends, so that links next but one do not touch at every position
+    # short of the joints at both ends, so links with one link between them do not touch at every
+    # position
     return tuple(
         LinkCapsule(k, np.array([0.2 * end, 0.8 * end]), RADIUS) for k, end in enumerate(ends)
     )
 
 
 def move(nq: int) -> tuple[Array, Array]:
-    """Start and goal (nq,) [rad] of a motion in which no link of the chain meets another."""
+    """Start and goal (nq,) [rad] of a motion of the chain without self-collision."""
     start = np.linspace(0.3, 0.6, nq)
     return start, start + 0.7 * np.cos(np.arange(nq))

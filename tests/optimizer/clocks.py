@@ -1,14 +1,14 @@
-"""Clocks that a test moves by itself: what hangs on a deadline does not hang on the machine."""
+"""Clocks controlled by a test: deadlines do not depend on the speed of the machine."""
 
 from __future__ import annotations
 
-# readings of the clock that a search needs at most to end once its deadline has passed: every stage
-# looks at it once, and a front does so in each of its searches
+# largest number of readings of the clock after the deadline: every stage of a search reads it once,
+# and a front does so in all of its searches
 LAST_READINGS = 40
 
 
 class CountingClock:
-    """Stands still but for each reading, which moves it on by `tick` [s]."""
+    """A clock that advances only when read, by `tick` [s]."""
 
     def __init__(self, tick: float = 1.0) -> None:
         self.now, self.tick = 0.0, tick

@@ -1,4 +1,4 @@
-"""What all tests of the library share: one thread for linear algebra, and the kernel of the default
+"""Shared by all tests of the library: one thread for linear algebra, and the kernel of the default
 robot.
 """
 

@@ -1,10 +1,12 @@
-"""A desk arm with five joints, a palletiser whose tool stays vertical, and fewer joints of both."""
+"""A desk arm with five joints, a palletiser with a vertical tool, and versions of both with fewer
+joints.
+"""
 
 from __future__ import annotations
 
 from joulepath.models.own_arm.description import Description
 
-# axis of each joint, and the vector from its frame to the next one's [m]
+# axis of every joint, and the vector from its frame to the next joint's frame [m]
 Links = tuple[tuple[str, str], ...]
 
 DESK: Links = (

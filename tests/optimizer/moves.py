@@ -1,4 +1,4 @@
-"""What the tests of the optimiser share: an arm, moves of it, and limits and targets made to
+"""Shared by the tests of the optimiser: an arm, moves of it, and limits and targets made to
 measure.
 """
 
@@ -20,7 +20,7 @@ from tests.by_pinocchio import flange, torques_of
 ROBOT = load_robot("ur5e")
 START = np.array([0.3, -1.4, 1.6, -0.9, -1.2, 0.5])
 GOAL = START + np.array([0.9, 0.5, -0.7, 0.3, 0.2, -1.0])
-# of the UR5e paper; tests/reference/README.md tells what is known of its joint convention
+# of the UR5e paper; tests/reference/README.md describes the known part of its joint convention
 HOME = np.radians([0, -90, 90, -90, 180, 0])
 PAPER = Path(__file__).parents[1] / "reference" / "paper_table1_poses.csv"
 PAYLOAD = Payload(
@@ -28,12 +28,12 @@ PAYLOAD = Payload(
 )
 TILTED = np.array([2.0, -4.0, -8.7])
 CEILING = np.array([0.0, 0.0, 9.81])
-# a deadline [s] that no search comes near, however busy the machine
+# a deadline [s] out of reach of any search, however busy the machine
 AMPLE = 300.0
 
 
 def problem(start: Any = START, goal: Any = GOAL, **given: Any) -> Problem:
-    """A problem in which nothing hits anything: moves are drawn without regard to it."""
+    """A problem without collisions: the moves are drawn without regard to them."""
     return problem_with(start, goal, **{"collisions": False} | given)
 
 
@@ -54,12 +54,12 @@ def changed(asked: Problem, **given: Any) -> Problem:
 
 
 def fixed(duration: float) -> dict[str, Any]:
-    """The fields of a problem that fix its duration [s]."""
+    """Fields of a problem with a fixed duration [s]."""
     return {"duration_min": duration, "duration_max": duration}
 
 
 def limits(**given: Any) -> Limits:
-    """The robot's limits with some replaced: one number for all joints, or one each."""
+    """The robot's limits with some replaced, by one number for all joints or one per joint."""
     return replace(
         ROBOT.limits,
         **{name: np.broadcast_to(value, 6).astype(float) for name, value in given.items()},

@@ -1,4 +1,4 @@
-"""The picture of a cell: what it shows, and that nothing is cut off."""
+"""The picture of a cell is complete, and nothing in it is cut off."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ LOADED = replace(ARM, payload=PART)
 
 
 def program() -> Program:
-    """To a stop where a part is taken up, to one where it is put down, and back."""
+    """To a stop that takes up a part, to a stop that puts it down, and back."""
     return Program(
         (
             Move(quintic_spline(START, MIDDLE, 1.0), ARM, "start to pick"),
@@ -74,7 +74,7 @@ def test_the_picture_has_ways_stops_and_bodies_and_all_of_it_is_inside() -> None
     assert texts == ["Start", "1", "2"]
     colours = {each.get("stroke") for each in root.iter(f"{SVG}path")}
     assert {asked.loaded, asked.empty} <= colours
-    # the part is in hand where it is drawn
+    # the picture shows the part in hand
     fills = [each.get("fill") or "" for each in root.iter(f"{SVG}path")]
     assert any(
         fill.startswith("#") and int(fill[1:3], 16) > 2 * int(fill[5:7], 16) for fill in fills

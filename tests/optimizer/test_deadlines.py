@@ -1,5 +1,5 @@
-"""Deadlines hold wherever the time goes: by a clock that moves with the work that is done, not with
-the machine.
+"""Deadlines hold in every stage of a search; the clock advances with the work, independent of the
+machine.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ DISTANCE = 6e-6  # per distance by Coal
 ROW = 2e-5  # per row of a quadratic program
 # relative; the same sums in the same order
 ROUNDING = 1e-12
-# the most that a deadline may be overrun [s]
+# largest overrun of a deadline [s]
 OVERRUN = 0.3
 
 
 class WorkClock:
-    """Stands still but for the work that is done."""
+    """A clock that advances only with the work."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -70,7 +70,7 @@ class WorkClock:
         return self.now
 
     def charged(self, call: Callable[..., Any], price: Callable[..., float]) -> Callable[..., Any]:
-        """The call, whose work moves the clock."""
+        """The call, with an advance of the clock for its work."""
 
         def run(*args: Any, **fields: Any) -> Any:
             self.now += price(*args, **fields)
@@ -81,7 +81,7 @@ class WorkClock:
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> WorkClock:
-    """A clock that every expensive call of the library moves."""
+    """A clock advanced by every expensive call of the library."""
     mine = WorkClock()
     prices: list[tuple[Any, str, Callable[..., float]]] = [
         (Evaluation, "__call__", lambda self, *arguments: NODE * len(arguments[0])),
@@ -96,7 +96,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> WorkClock:
 
 
 def crowded() -> Scene:
-    """64 meshes around the arm, which Coal measures one by one."""
+    """64 meshes around the arm, measured one by one by Coal."""
     rng, things = np.random.default_rng(3), list[Obstacle]()
     while len(things) < 64:
         direction = rng.normal(size=3)

@@ -1,4 +1,4 @@
-"""Poses of arms with fewer than six joints: those that they hold, and a clear refusal of others."""
+"""Poses of arms with fewer than six joints: reachable ones are solved, others are refused."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tests.selection import long_but
 
 HOME = np.array([0.2, -0.4, 0.9, 0.5, 0.3])
 THERE = np.array([-0.9, 0.3, 0.6, 0.8, -0.7])
-# the axis of the last joint, about which it turns the tool, and one across it
+# the axis of the last joint, which turns the tool about it, and a perpendicular one
 ROLL = np.array([1.0, 0.0, 0.0])
 ACROSS = np.array([0.0, 0.0, 1.0])
 # m and rad: residual of a pose, and difference of a configuration found again
@@ -57,7 +57,7 @@ def error(arm: Arm, pose: ConeOrientedPose, q: np.ndarray) -> float:
 
 @pytest.mark.parametrize("axis", [ROLL, ACROSS])
 def test_position_and_axis_with_five_joints(arm: Arm, axis: np.ndarray) -> None:
-    """Every configuration reaches the pose; among them is the one that made it."""
+    """Every configuration reaches the pose; the configuration behind the pose is among them."""
     for q in (HOME, THERE):
         pose = ConeOrientedPose.about(Pose(tcp_pose(arm, q)), axis)
         found = inverse_kinematics(arm, pose, windings=False)

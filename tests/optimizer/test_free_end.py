@@ -1,5 +1,5 @@
-"""Paths whose start or goal leaves the rotation about an axis of the tool open: the gain, the
-bound, and the refusals.
+"""Paths with a free rotation of the tool about an axis at the start or goal: saved energy, bound,
+and refusals.
 """
 
 from __future__ import annotations
@@ -185,7 +185,7 @@ FAR_AWAY = down(0.8, -0.12, 0.25)
 
 
 def inwards(start: Any) -> Problem:
-    """A line towards the base, at whose end a nozzle points back at it."""
+    """A line towards the base; at its end, a nozzle points back at the base."""
     goal = down(0.45, -0.12, 0.25)
     return over_the_base(start=start, goal=goal, branch=BranchFilter("right", "up", "flip"))
 
@@ -197,7 +197,7 @@ def retracted() -> Solution:
 
 @pytest.mark.long
 def test_a_known_motion_from_a_free_start_is_certified_as_it_is(retracted: Solution) -> None:
-    """Another run has not followed the path from the very start that the first one chose."""
+    """The second run starts without the path's start chosen by the first run."""
     again = Run(inwards(free(FAR_AWAY))).as_it_is(retracted.trajectory.spline)
     assert again.certificate.valid
     assert again.energy.electrical.total == pytest.approx(

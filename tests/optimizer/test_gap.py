@@ -11,7 +11,7 @@ from joulepath.optimizer.presentation.gap import gap_text, optimality_gap
 
 # relative
 ROUNDING = 1e-12
-# share of the last digit that a text shows
+# share of a unit of the last printed digit
 DIGIT = 1e-3
 
 

@@ -1,5 +1,5 @@
-"""The limit of one BLAS thread: in force in every thread that asks for it, lifted when the last one
-leaves.
+"""The limit of one BLAS thread is in force in every thread that requests it, and ends when the last
+one leaves.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def counts() -> set[int]:
 
 
 class Neighbour:
-    """Another thread that enters and leaves when it is told to."""
+    """Another thread that enters and leaves on request."""
 
     def __init__(self) -> None:
         self._entered, self._leave = threading.Event(), threading.Event()

@@ -48,7 +48,7 @@ def test_problems_are_taken_as_they_are_needed() -> None:
 
 
 class _Client:
-    """The part of a Dask client that is used."""
+    """The subset of a Dask client used by the library."""
 
     def get_executor(self) -> Executor:
         return _AtOnce()

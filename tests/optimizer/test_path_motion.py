@@ -29,7 +29,7 @@ GOAL = np.array([0.66, -1.4, 0.75, -0.92, -1.57, -0.91])
 T_FLANGE_TCP = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.12])).homogeneous
 # of a share of a limit, between samples a tenth of the certificate's own
 TOLERANCE = 1e-6
-# of energies that ought to be the same, or in order: what the solver leaves open
+# of energies expected to be equal or ordered: the tolerance of the solver
 SOLVER = 1e-3
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -143,8 +143,8 @@ def speed_of(task: Problem) -> float:
 
 
 def deviations(task: Problem, found: Solution, count: int = 4000) -> tuple[float, float]:
-    """Largest deviation from the speed between the ramps, and above it on them, as shares of it; by
-    the positions.
+    """Largest deviation from the speed between the ramps, and excess over it on the ramps, as
+    shares of it, computed from the positions.
     """
     steps = np.linalg.norm(np.diff(poses_of(found, count)[:, :3, 3], axis=0), axis=1)
     off = steps * (count - 1) / found.trajectory.spline.duration / speed_of(task) - 1
@@ -168,7 +168,7 @@ def test_the_speed_is_held(name: str) -> None:
 
 
 def test_the_certificate_finds_a_speed_that_is_not_held() -> None:
-    """Too slow, too fast, and one that is right on average."""
+    """Too slow, too fast, and uneven with the right average."""
     found = optimize(LINE)
     spline, ends = found.trajectory.spline, (found.start.q, found.goal.q)
     for factor, valid in (

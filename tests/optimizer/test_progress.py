@@ -1,5 +1,5 @@
-"""What a search tells while it runs, and the bar in a terminal: progress changes nothing, goes
-forward only, and ends with the answer.
+"""Progress of a search and its bar in a terminal: it changes no result, only increases, and ends
+with the answer.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def asked(bound: str) -> Problem:
 
 
 def goes_forward(events: list[Event]) -> list[Improved]:
-    """The best answers told; each is better than the one before, or bounded better."""
+    """The best answers reported; every one is better than the one before, or has a better bound."""
     assert isinstance(events[0], CandidatesFound)
     totals = [each.total for each in events if isinstance(each, CandidatesFound)]
     assert totals == sorted(set(totals))
@@ -78,9 +78,7 @@ def test_a_search_ends_with_its_answer(bound: str) -> None:
 
 
 def test_no_bound_is_told_that_is_not_proven() -> None:
-    """Of an orientation that is free about an axis, only samples are solved: the bound comes at the
-    end.
-    """
+    """An orientation free about an axis is solved by samples: the bound follows at the end."""
     events: list[Event] = []
     start, goal = np.radians([0, -80, 90, -90, -85, 0]), np.radians([30, -70, 80, -90, -85, 10])
     answer = optimize(problem(start, tcp_pose(goal), method="time_scaling"), tell=events.append)
@@ -169,7 +167,7 @@ print("done")
 
 
 def shown(delay: float, lasts: float, script: str = SEARCH) -> str:
-    """What a terminal shows of searches."""
+    """The terminal output of searches."""
     own = os.environ | {"PYTHONPATH": str(ROOT), "TERM": "xterm", "COLUMNS": "120"}
     command = [sys.executable, "-c", script.format(delay=delay, lasts=lasts)]
     return on_terminal(command, own)

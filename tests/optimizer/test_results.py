@@ -1,4 +1,4 @@
-"""What results do in a notebook or a script, each with a small real one."""
+"""Methods of results for notebooks and scripts, on small real results."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_its_html_is_a_table(name: str) -> None:
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_its_html_has_a_picture(name: str) -> None:
-    """It is well-formed, and each curve has as many points as are drawn."""
+    """It is well-formed, and every curve has its full number of points."""
     html = ElementTree.fromstring(result(name)._repr_html_())
     namespace = "{http://www.w3.org/2000/svg}"
     curves = html.findall(f"./{namespace}svg/{namespace}polyline")
@@ -210,7 +210,7 @@ def test_results_of_other_motions_differ() -> None:
 
 
 class Frames:
-    """A package of data frames that keeps the columns."""
+    """A stand-in for a package of data frames that keeps the columns."""
 
     @staticmethod
     def DataFrame(columns: dict[str, Any]) -> dict[str, Any]:

@@ -40,8 +40,7 @@ from tests.selection import long_but
 
 JOINTS = (2, 3, 5, 8)
 OBJECTIVES: dict[str, dict[str, Any]] = {"electrical": {}, "mechanical": {"duration_max": 1.5}}
-# relative, of the energy: a sum over this many equal steps, of powers that have corners where they
-# change sign
+# relative, of the energy: a sum over this many equal steps, of powers with corners at sign changes
 STEPS = 20001
 SUMMED = 1e-3
 # relative, of a limit: the certificate's own tolerance
@@ -138,8 +137,7 @@ def test_without_capsules_there_is_nothing_to_collide() -> None:
 
 def test_links_keep_clear_of_each_other(robot: Robot) -> None:
     clearance = optimize(problem(robot)).certificate.clearance
-    # links next to each other are not compared: of two joints, only the base and the last link are
-    # left
+    # neighbouring links are not compared: with two joints, only the base and the last link remain
     assert clearance is not None and clearance.min_clearance >= 0
 
 
@@ -178,7 +176,7 @@ def test_limits_along_the_path_waiting_and_a_bus(robot: Robot) -> None:
 
 
 def test_joint_targets_ask_no_inverse_kinematics(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not even where there is a closed form: all that it gives then is the label."""
+    """Even arms with a closed form do not use it: it would only provide the label."""
 
     def solved(*_: Any, **__: Any) -> None:
         raise AssertionError("inverse kinematics was asked")

@@ -1,4 +1,4 @@
-"""What a computation without a search tells while it runs: its steps, up to the last."""
+"""Progress of a computation without a search: its steps, up to the last."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def solution(problem: joulepath.Problem) -> joulepath.Solution:
 
 
 def told(compute: Callable[[Any], object]) -> list[joulepath.StepsDone]:
-    """What a computation tells: it begins at nothing, and never goes back."""
+    """Reported progress of a computation: it begins at zero and never decreases."""
     events = list[joulepath.StepsDone]()
     compute(events.append)
     assert events[0].done == 0 and len({(each.total, each.name) for each in events}) == 1
@@ -58,7 +58,7 @@ def motions(count: int) -> dict[str, tuple[Any, float]]:
     long_but(["trapezoid", "recording"], ["linear", "trapezoid", "quintic", "spline", "recording"]),
 )
 def test_an_evaluation_tells_the_time_that_it_has_reached(arm: joulepath.Arm, kind: str) -> None:
-    """Of a motion of more than one block, and of a smooth one, which is one block."""
+    """A motion of more than one block, and a smooth motion of one block."""
     motion, duration = motions(2500)[kind]
     events = told(lambda tell: joulepath.evaluate(arm, motion, tell=tell))
     assert len(events) == 2 if kind == "spline" else len(events) > 2
@@ -103,7 +103,9 @@ def test_a_replay_tells_its_simulations(
 
 @pytest.mark.long
 def test_an_identification_tells_its_fits() -> None:
-    """One without each motion, and the last to all; one alone if nothing is held out."""
+    """One fit without each motion, and the last one with all motions; a single fit if nothing is
+    held out.
+    """
     robot = joulepath.load_robot("ur5e")
     log = read(csv_of(recorded(robot, truth_of(robot), moves=4)), robot)
     options = joulepath.IdentificationOptions(held_out=1.0)

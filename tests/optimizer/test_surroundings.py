@@ -51,7 +51,7 @@ def test_a_collision_is_named_with_its_time() -> None:
     assert found is not None
     assert found.min_clearance == found.sampled < -0.01
     assert found.pair[0] == "post" and found.pair[1].startswith("wrist")
-    # the post is where the motion is half way; samples are 1/95 s apart
+    # the motion passes the post half way; samples are 1/95 s apart
     assert found.time == pytest.approx(0.5, abs=0.05)
 
 
@@ -62,8 +62,8 @@ def test_a_motion_that_passes_closely_needs_its_proof() -> None:
     assert proof is not None and 0 < proof.min_clearance < proof.sampled
     assert near.worst_violation(MOTION) is None
     (post,) = near.arm.scene.obstacles
-    # the proof ends when its bound is at most the gap below the least sample: here that leaves it
-    # below zero
+    # the proof ends at a bound no lower than the least sample less the gap: here the bound is below
+    # zero
     margin = post.margin + proof.sampled - CLEARANCE_PROOF.gap / 4
     closer = Surroundings(replace(near.arm, scene=Scene([replace(post, margin=margin)])))
     assert closer.is_collision_free(sample(MOTION, np.linspace(0, 1, 500))[0])
@@ -117,7 +117,7 @@ def test_paths_are_planned_once() -> None:
     planned = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE))
     assert planned.paths and surroundings.has_planned_paths(START, GOAL)
     assert not surroundings.has_planned_paths(GOAL, START)
-    # a deadline that has passed leaves no time to plan
+    # after the deadline there is no time for planning
     again = surroundings.planned_paths(START, GOAL, Deadline.after(-1.0))
     assert [path.tolist() for path in again.paths] == [path.tolist() for path in planned.paths]
 

@@ -1,5 +1,5 @@
-"""Any number of threads of one process: every result is, bit for bit, what one thread alone
-gives."""
+"""In any number of threads of one process, every result is bitwise equal to the result of one
+thread."""
 
 from __future__ import annotations
 
@@ -19,22 +19,20 @@ from joulepath.optimizer.deadline import Deadline
 from tests.optimizer.concurrent_work import Work, all_work, behind_a_post, fingerprint
 
 THREADS = 8
-# s: ample for a machine that is busy with other things; a quiet one needs a tenth
+# s: ample for a machine busy with other work; an idle one needs a tenth
 PATIENCE = 1200.0
 
 
 @pytest.fixture(autouse=True)
 def _several_blas_threads() -> Iterator[None]:
-    """As in a program that leaves linear algebra as it is: results must not depend on its threads
-    either.
-    """
+    """Allows four BLAS threads, as a program may: results must not depend on their number."""
     with threadpool_limits(limits=4, user_api="blas"):
         yield
 
 
 def in_threads(shares: Sequence[Sequence[Work]]) -> list[dict[str, object]]:
-    """The fingerprint of every result by the work's name, for threads that each do their share at
-    the same time.
+    """The fingerprint of every result by the work's name, for threads with a share of the work
+    each, run at the same time.
     """
     found: list[dict[str, object]] = [{} for _ in shares]
     errors: list[BaseException] = []
@@ -95,7 +93,7 @@ def test_a_thread_that_waits_for_another_ones_planner_keeps_its_deadline() -> No
 
 
 def test_robots_are_loaded_once_by_threads_that_come_at_once() -> None:
-    """In a process of its own, where nobody has loaded one yet."""
+    """In a new process, before any robot is loaded."""
     code = (
         "import threading\n"
         "from concurrent.futures import ThreadPoolExecutor\n"

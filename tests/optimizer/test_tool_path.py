@@ -113,8 +113,8 @@ def test_an_arc_is_part_of_a_circle() -> None:
 
 @pytest.mark.long
 def test_a_recorded_curve_goes_through_every_pose() -> None:
-    """A spiral of one and a half turns that narrows, given by 100 poses, while the tool turns by
-    0.6 rad.
+    """A narrowing spiral of one and a half turns, given by 100 poses, while the tool turns by 0.6
+    rad.
     """
     share = np.linspace(0.0, 1.0, 102)[1:]
     angle, radius = 3 * np.pi * share, 0.1 - 0.05 * share
@@ -159,15 +159,15 @@ CORNERED = ToolPath(via=[moved([0.0, 0.2, 0.0])], blend=0.04, least_speed=0.19, 
 
 
 def cornered(**given: Any) -> Problem:
-    """A line, a rounded corner and a line, on which the TCP is nearly even."""
+    """A line, a rounded corner and a line, with a nearly even TCP speed."""
     return along(
         moved([0.0, 0.2, -0.15]), **{"arm": ARM.no_faster_than(0.2), "path": CORNERED} | given
     )
 
 
 def speeds_of(found: Solution, count: int = 4000) -> tuple[float, float, float]:
-    """Greatest speed [m/s] of the TCP, the least one between the ramps, and that at the start, by
-    its positions.
+    """Greatest TCP speed [m/s], the least one between the ramps, and the speed at the start, from
+    positions.
     """
     steps = np.linalg.norm(np.diff(poses_of(found, count)[:, :3, 3], axis=0), axis=1)
     speed, gone = steps * (count - 1) / found.trajectory.spline.duration, np.cumsum(steps)
@@ -329,7 +329,7 @@ def test_random_lines_are_followed_or_refused(seed: int) -> None:
 
 @pytest.mark.parametrize("duration", long_but([60.0], [20.0, 60.0, 300.0]))
 def test_a_slow_motion_keeps_to_the_path(duration: float) -> None:
-    """Where time costs next to nothing else, the optimal timing is uneven."""
+    """At low speeds the energy hardly depends on the timing, and the optimal timing is uneven."""
     found = optimize(
         along(moved([0.0, 0.3, -0.1]), duration_min=duration, duration_max=1.2 * duration)
     )

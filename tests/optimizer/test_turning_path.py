@@ -1,6 +1,4 @@
-"""Paths on which the tool may turn about an axis: what it gains, and what the certificate makes of
-it.
-"""
+"""Paths with free rotation of the tool about an axis: saved energy and certificate."""
 
 from __future__ import annotations
 
@@ -35,7 +33,7 @@ def down(x: float, y: float, z: float) -> Pose:
 
 
 def over_the_base(**given: Any) -> Problem:
-    """A line over the first axis, where a wrist above the TCP cannot be."""
+    """A line over the first axis, out of reach of a wrist above the TCP."""
     path = given.pop("path", ToolPath(about=Z))
     task = {
         "arm": ARM,
@@ -123,7 +121,7 @@ def test_a_turning_is_the_shortest_of_all_on_its_sheet() -> None:
     drawn = rng.uniform(0.5, 1.5, (4, len(sheet.angles)))
 
     def cost(first: Array, second: Array, k: Any) -> Array:
-        """That of the way in the joints, times a factor of the point where a step begins."""
+        """The path length in joint space, times a factor of the point at the start of a step."""
         begins = np.abs(sheet.q[k, :, 5] - first[:, None, 5]).argmin(axis=1)
         return shortest(first, second, k) * drawn[k, begins]
 

@@ -57,7 +57,8 @@ def test_same_motion_is_what_pinocchio_says(asked: Problem, base: Solution) -> N
     assert found.certificate.valid
     assert found.certificate.energy_error < QUADRATURE
     spline = base.trajectory.spline
-    # the base's own energy is not that of the loaded arm, and the certificate would say so
+    # the energy of the base motion differs from the energy of the loaded arm, and the certificate
+    # would show it
     assert (
         certify(loaded, spline, base.start.q, base.goal.q, base.energy).energy_error
         > 10 * QUADRATURE
@@ -66,9 +67,7 @@ def test_same_motion_is_what_pinocchio_says(asked: Problem, base: Solution) -> N
 
 @pytest.mark.parametrize("method", ["time_scaling", "uniform_scaling"])
 def test_optimising_anew_never_costs_more(asked: Problem, base: Solution, method: str) -> None:
-    """Also where what is found from the ground up does: these methods' own motions are worse than
-    the base's.
-    """
+    """Even if the new search finds worse motions than the base motion."""
     worse = replace(asked, method=method)  # type: ignore[arg-type]
     same = PreparedProblem.of(worse).energy(base.trajectory.spline).electrical.total
     assert optimize(worse).energy.electrical.total > same
@@ -110,8 +109,8 @@ def test_no_time_leaves_the_same_motion(asked: Problem, base: Solution) -> None:
 def test_wherever_the_deadline_ends_it_the_same_motion_is_in_hand(
     asked: Problem, base: Solution, readings: int
 ) -> None:
-    """On an arm with a part, the base motion needs less than what time is left for, or there is
-    nothing else.
+    """For an arm with a part, the base motion needs less than the results of the remaining time, or
+    there are no results.
     """
     worse = replace(
         changed(asked, payload=PAYLOAD), method="uniform_scaling", deadline=float(readings)

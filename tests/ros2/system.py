@@ -1,4 +1,4 @@
-"""The node, and a client of it in ROS 2, each with an executor of its own."""
+"""The node and a ROS 2 client of it, with separate executors."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ PATIENCE = 60.0
 
 @dataclass
 class System:
-    """A client of the node, with all that it received."""
+    """A client of the node, with all its received messages."""
 
     node: PlanningNode
     client: Node

@@ -36,7 +36,7 @@ GOAL_COLLIDES = -12
 
 @pytest.fixture(scope="module")
 def ur5e() -> Iterator[System]:
-    """A node for a ur5e, whose joints have a prefix in ROS, at the start."""
+    """A node for a ur5e at the start, with a prefix before its joint names in ROS."""
     with system(robot="ur5e", prefix="left_", deadline=60.0) as own:
         own.scenes = own.client.create_publisher(  # type: ignore[attr-defined]
             moveit.PlanningScene, f"{own.namespace}/planning_scene", 10

@@ -1,5 +1,5 @@
-"""The node in a ROS 2 system: real messages over the loopback interface, and a real planner except
-where the test is about something else.
+"""The node in a ROS 2 system: real messages over the loopback interface, and a real planner in all
+tests about planning.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ REACHED = 1e-6
 
 @pytest.fixture(scope="module")
 def ur5e() -> Iterator[System]:
-    """A node for a ur5e, whose joints have a prefix in ROS."""
+    """A node for a ur5e with a prefix before its joint names in ROS."""
     with system(robot="ur5e", prefix="left_", deadline=60.0) as own:
         yield own
 
@@ -53,7 +53,7 @@ def left(names: list[str]) -> list[str]:
 
 
 def error_of(summary: Json) -> tuple[list[str], str]:
-    """Path and message of the field that is wrong."""
+    """Path and message of the wrong field."""
     assert summary["state"] == "refused"
     error = summary["problem"]["errors"][0]
     return error["loc"], error["msg"]
@@ -76,7 +76,7 @@ def test_a_plan_fits_a_joint_trajectory_controller(ur5e: System) -> None:
     assert (trajectory.header.stamp.sec, trajectory.header.stamp.nanosec) == (0, 0)
     assert (first.time_from_start.sec, first.time_from_start.nanosec) == (0, 0)
     assert np.allclose(first.positions, START, rtol=0, atol=ROUNDING)
-    # a controller refuses a trajectory that does not end at rest
+    # a controller refuses a trajectory with a final speed other than zero
     assert list(last.velocities) == [0.0] * 6
     assert np.allclose(last.positions, GOAL, rtol=0, atol=REACHED)
     times = [
@@ -152,7 +152,7 @@ def test_wrong_messages_are_refused_by_field_and_the_node_goes_on(ur5e: System) 
 
 
 class Waiting:
-    """Stands in for a planner that takes long: every plan waits until it is stopped."""
+    """A stand-in for a slow planner: every plan waits until it is stopped."""
 
     joints = tuple(JOINTS)
 
@@ -292,5 +292,5 @@ def test_the_example_prints_the_joules_of_a_plan() -> None:
         command = [sys.executable, str(example), "--ros-args", "-r", f"__ns:={own.namespace}"]
         done = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
         assert done.returncode == 0, done.stderr
-        # the figures of the page, which the library computes
+        # the figures of the documentation page, computed by the library
         assert done.stdout.startswith("43.2 J") and "less than straight" in done.stdout

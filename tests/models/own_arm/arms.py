@@ -1,4 +1,4 @@
-"""Arms of users for tests: a plain one, and one with all that a URDF may hold."""
+"""Arms of users for tests: a plain one, and one with all features of a URDF."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ AMPLE = 300.0
 PLAIN = Description(urdf=URDF, tip="tool", acceleration=8.0, payload=2.0)
 
 
-# an arm with all that a URDF may have: axes off z, a joint without end, fixed bodies with mass, a
-# gripper, a link named as ours are, a joint named as its link, a prefix that nobody declared, boxes
-# and spheres
+# an arm with all features of a URDF: axes off z, a joint without end, fixed bodies with mass, a
+# gripper, a link with a name of this library, a joint named like its link, an undeclared prefix,
+# boxes and spheres
 RICH = """<robot name="rich">
   <link name="world"/><link name="pedestal"/><link name="elbow"/><link name="hand"/>
   <joint name="fixed_1" type="fixed"><parent link="world"/><child link="pedestal"/>
@@ -115,8 +115,7 @@ BLOCK = np.array([[x, y, z] for x in (0, 180) for y in (0, 60) for z in (0, 40)]
 
 
 def obj(points: Any) -> bytes:
-    """An OBJ with these corners (n, 3), and a face for each three of them that follow one
-    another."""
+    """An OBJ with these corners (n, 3), and a face for every three consecutive corners."""
     lines = [f"v {x} {y} {z}" for x, y, z in np.asarray(points).tolist()]
     return "\n".join(
         [*lines, *(f"f {k} {k + 1} {k + 2}" for k in range(1, len(lines) - 1))]

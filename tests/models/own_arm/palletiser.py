@@ -53,7 +53,7 @@ PALLETISER = (
     + joint("a4", "plate tool", "0.1 0 -0.1", DOWN, "-3 3")
     + "</robot>"
 )
-# With one parallelogram only, the arm is a plain chain in which joint 3 turns by a3 - a2.
+# With one parallelogram only, the arm is a plain chain: joint 3 turns by a3 - a2.
 ONE_PARALLELOGRAM = (
     LINKS
     + link("knee", 1e-6, "0 0 0").replace('="0.0', '="0.00000')

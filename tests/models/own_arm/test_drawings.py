@@ -64,7 +64,7 @@ def test_a_rounded_angle_is_taken_as_meant(written: str, degrees: int) -> None:
 
 @pytest.mark.parametrize("length", [1e-320, 1e-200, 2.0, 1e200])
 def test_an_axis_of_any_length_is_a_direction(length: float) -> None:
-    """Even where its square is zero or infinite."""
+    """Even if its square underflows or overflows."""
     drawing = drawn(UR5E, AS_GIVEN)
     assert 'xyz="0.0 0.0 1.0"' in drawing
     longer = robot(described(drawing.replace('xyz="0.0 0.0 1.0"', f'xyz="0 0 {length!r}"')))

@@ -1,4 +1,4 @@
-"""Masses that a URDF lacks, from volumes or from the user, and impossible inertias."""
+"""Missing masses of a URDF, from volumes or from the user, and impossible inertias."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BARE = replace(PLAIN, urdf=WITHOUT)
 # kg, m³: of the cylinder of the upper arm and the box of the forearm
 CYLINDER = np.pi * 0.05**2 * 0.3
 CUBOID = 0.1 * 0.06 * 0.2
-# the flat faces of a mesh against those of a round body
+# error of a mesh with flat faces against a round body
 FACETED = 0.01
 FLAT = (
     'izz="0.004"',
@@ -64,7 +64,7 @@ def test_a_total_mass_is_met_by_the_sum_of_all_links() -> None:
 
 
 def test_a_mass_of_zero_is_none() -> None:
-    """Exporters write zeros for bodies whose mass nobody entered."""
+    """Exporters write zeros for bodies without a given mass."""
     zeros = "".join(f' {part}="0"' for part in TENSOR)
     inertial = f'<inertial><mass value="0"/><inertia{zeros}/></inertial>'
     empty = replace(PLAIN, urdf=re.sub(r"<inertial>.*?</inertial>", inertial, BOXED, flags=re.S))

@@ -1,4 +1,4 @@
-"""Joints that mimic moving ones: their laws, limits and refusals, and Pinocchio's own reading."""
+"""Joints that mimic moving joints: laws, limits and refusals, against Pinocchio's own reading."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_positions_limits_and_names_are_those_of_the_joints_with_motors() -> Non
     arm = robot(description())
     assert arm.joint_names == ("a1", "a2", "a3", "a4")
     assert arm.link_names[1:] == ("swivel", "lower", "knee", "upper", "plate", "tool")
-    # the range of m3 is that of a3 from -0.2 to 1.3, and m2 leaves that of a2 as it is
+    # m3 limits a3 to -0.2 … 1.3, and m2 leaves the range of a2 unchanged
     np.testing.assert_allclose(arm.limits.q_min, [-2.9, -0.7, -0.2, -3.0])
     np.testing.assert_allclose(arm.limits.q_max, [2.9, 1.5, 1.3, 3.0])
     np.testing.assert_allclose(arm.limits.v_max, [2.0, 2.0, 1.5, 2.0])
@@ -84,7 +84,9 @@ def test_torques_and_poses_are_those_of_mimic_joints_in_pinocchio(oblique: bool)
 
 
 def test_an_arm_with_a_parallelogram_is_a_plain_one_with_other_motors() -> None:
-    """Joint 3 of the plain chain turns by a3 - a2, so that the torque of a2 loses that of a3."""
+    """Joint 3 of the plain chain turns by a3 - a2, so the torque of a2 is reduced by the torque of
+    a3.
+    """
     bare = replace(description(), drives=Drives(rotor_inertia=0.0))
     both = [
         Plant(Arm(robot=robot(replace(bare, urdf=urdf)))) for urdf in (ONE_PARALLELOGRAM, PLAIN)
@@ -93,7 +95,7 @@ def test_an_arm_with_a_parallelogram_is_a_plain_one_with_other_motors() -> None:
     P = np.eye(4)
     P[2, 1] = -1.0
     ours, plain = both[0].torques(q, v, a), both[1].torques(q @ P.T, v @ P.T, a @ P.T)
-    # that of the knee, a link of 1e-6 kg
+    # the tolerance covers the torque of the knee, a link of 1e-6 kg
     assert np.abs(ours - plain @ P).max() < 1e-3
     gain = [both[0].potential(q[1]) - both[0].potential(q[0])]
     gain.append(both[1].potential(P @ q[1]) - both[1].potential(P @ q[0]))

@@ -1,4 +1,4 @@
-"""Figures in other units and placeholders: one warning each, with the likely cause."""
+"""Figures in other units and placeholders cause one warning each, with the likely cause."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ CAUSES = (
 
 
 def test_joints_that_turn_about_one_line() -> None:
-    """As in a file whose exporter lost an axis."""
+    """Like a file with an axis lost by its exporter."""
     lost = RICH.replace(
         '<origin xyz="0.05 0 0.3" rpy="1.5707963267948966 0.3 0"/><axis xyz="1 1 0.5"/>',
         '<origin xyz="0 0 0.3"/><axis xyz="0 0 1"/>',
@@ -48,7 +48,7 @@ def changed(old: str, new: str) -> Description:
     return replace(PLAIN, urdf=PLAIN.urdf.replace(old, new, 1))
 
 
-# identified together: they share what single torques do not tell
+# identified together: single torques do not separate these inertias
 IDENTIFIED_INERTIAS = {"panda": ("link1", "link5")}
 
 

@@ -1,5 +1,5 @@
-"""What makes no robot is refused by link or joint, what is hardly real is remarked, and a broken
-URDF is told as such.
+"""URDFs without a usable robot are refused with the link or joint, implausible figures cause a
+remark, and broken XML is reported.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Descriptions of arms whose files have xacro macros and lie in ROS packages."""
+"""Descriptions of arms with xacro macros, in ROS packages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MACROS = """<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:arg name="leng
 
 @pytest.fixture
 def arm(tmp_path: Path) -> Path:
-    """A description beside a package that uses macros of another one, and has a mesh."""
+    """A description next to its package, with macros of another package and a mesh."""
     for package, name, text in (
         ("cell_arm", "arm.urdf.xacro", _arm()),
         ("macros", "places.xacro", MACROS),
@@ -52,7 +52,7 @@ def _arm() -> str:
 
 
 def test_macros_packages_and_arguments(arm: Path) -> None:
-    """The package beside that of the file is found, and an argument changes the arm."""
+    """The package next to the file's own is found, and an argument changes the arm."""
     pytest.importorskip("xacrodoc")
     found = read_description(arm)
     assert "xacro:place" not in found.urdf and 'xyz="0 0 0.4"' in found.urdf

@@ -64,7 +64,7 @@ def test_defaults_have_the_ranges_of_the_table(name: str, joint: int, range_of: 
 
 
 def test_joints_share_a_factor_of_friction() -> None:
-    """Two joints err together by the temperature, and each on its own."""
+    """Temperature gives two joints a common error, and every joint has an independent one."""
     one, two = drawn(UR5E, "coulomb", 1), drawn(UR5E, "coulomb", 4)
     correlation = np.corrcoef(one, two)[0, 1]
     assert 0.2 < correlation < 0.6
@@ -102,7 +102,7 @@ def test_identified_figures_have_the_documents_covariance() -> None:
     # the document tells the friction of joint 2, and the others have the default range
     friction = np.sqrt(np.diag(spread.covariances["friction"])[place("coulomb", 6)])
     assert friction[1] == 0 and (np.delete(friction, 1) > 0.1).all() and spread.move_sd == 1.5
-    # a figure that was not identified keeps its range
+    # a figure without identification keeps its range
     assert "idle_power" in spread.covariances
 
 
@@ -113,7 +113,7 @@ def test_figures_may_be_known_exactly() -> None:
 
 
 def test_an_engineering_default_is_known_less_well() -> None:
-    """Of an arm of one's own, whose figures follow from rules."""
+    """A user's own arm, with figures that follow from rules."""
     robot = own_robot("ruled", own_figures("ruled", to_description(OwnArm(**ARM)))[0])
     low, high = np.quantile(drawn(robot, BASE_POWER) / robot.electronics.idle_power, [0.05, 0.95])
     assert (low, high) == pytest.approx((0.5, 2.5), rel=10 * STRIP)

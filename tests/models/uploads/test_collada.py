@@ -1,4 +1,4 @@
-"""Corners of COLLADA files: where their scenes place them, in metres."""
+"""Corners of COLLADA files, in metres, in the placement of their scenes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def read(nodes: str, more: str = "") -> np.ndarray:
 
 
 def test_nested_transformations_apply_from_the_outermost() -> None:
-    """A translation, then a quarter turn about z, then a scale, then a matrix that shifts."""
+    """A translation, then a quarter turn about z, then a scale, then a matrix with a shift."""
     nodes = (
         "<node><translate>10 0 0</translate><rotate>0 0 2 90</rotate><node><scale>2 1 1</scale>"
         f"<matrix>1 0 0 1  0 1 0 0  0 0 1 0  0 0 0 1</matrix>{INSTANCE}</node></node>"

@@ -1,4 +1,4 @@
-"""Meshes as they are read here, beside what trimesh makes of the same files by itself."""
+"""Meshes as read by this library, against trimesh's own reading of the same files."""
 
 from __future__ import annotations
 
@@ -32,9 +32,7 @@ BALL = trimesh.creation.icosphere(subdivisions=1)
 
 
 def sorted_triangles(triangles: Array) -> list[list[tuple[float, ...]]]:
-    """Triangles (n, 3, 3), whichever corner each begins with, in an order that does not depend on
-    the file's.
-    """
+    """Triangles (n, 3, 3) in an order independent of the file and of their first corners."""
     found = []
     for corners in triangles.tolist():
         first = corners.index(min(corners))
@@ -78,7 +76,7 @@ def test_what_is_too_large_is_refused_before_it_is_made(kind: str) -> None:
 
 
 def test_a_face_may_name_textures_and_normals_of_some_corners_alone() -> None:
-    """trimesh by itself takes their numbers for those of corners."""
+    """trimesh itself takes the numbers of textures and normals for numbers of corners."""
     mixed = SQUARE.replace("f 1//1 2//1 3//1 ", "f 1/1/1 2 3//1 ").replace("4//1", "4").encode()
     plain, triangles = read_mesh("obj", mixed, MeshSize())
     corners, same = read_mesh("obj", SQUARE.encode(), MeshSize())

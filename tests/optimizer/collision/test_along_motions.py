@@ -1,4 +1,4 @@
-"""Distances along motions, which are computed from few samples, against those of every sample."""
+"""Distances along motions from few samples, against the distances of all samples."""
 
 from __future__ import annotations
 
@@ -24,9 +24,7 @@ WITHIN = (0.0, 0.03, 0.3)  # m
 
 
 def samples(kind: str, seed: int, count: int) -> Array:
-    """Samples q (count, nq) [rad] of a slow motion, of leaps from anywhere to anywhere, or of one
-    that stands still.
-    """
+    """Samples q (count, nq) [rad] of a slow motion, of random leaps, or of a motion at rest."""
     rng = np.random.default_rng(seed)
     if kind == "leaps":
         return rng.uniform(-3, 3, (count, 6))
@@ -62,7 +60,7 @@ def test_distances_along_a_motion(kind: str, count: int) -> None:
 
 
 def test_what_is_proven_clear_is_certified() -> None:
-    """And what is not, has no proven clearance that is worth mentioning."""
+    """The proven clearance of any other motion is below twice the gap of the proof."""
     clear = 0
     for seed in range(20):
         model = CollisionModel(arm_in_cell(LOADS[0], cell(seed)))
@@ -81,8 +79,8 @@ def test_what_is_proven_clear_is_certified() -> None:
 def test_what_is_proven_clear_is_certified_even_if_its_proof_takes_too_long(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The bound near to the least distance takes more checks than the limit, that the margins hold
-    takes fewer.
+    """A bound near the least distance needs more checks than the limit; a proof of the margins
+    needs fewer.
     """
     points = np.random.default_rng(0).uniform(-1.2, 1.2, (35, 400, 3))[4]
     around = Points(points[np.linalg.norm(points, axis=1) > 0.55], 0.002)

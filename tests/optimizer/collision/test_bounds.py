@@ -36,7 +36,7 @@ def in_cell(seed: int, count: int) -> tuple[CollisionModel, Array]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_balls_and_covering_spheres_bound_the_distances_from_below(seed: int) -> None:
-    """Bounds of balls are those of the definition; most covering spheres are better than balls."""
+    """Bounds of balls agree with their definition; bounds of covering spheres are mostly better."""
     model, q = in_cell(seed, 60)
     frames, pairs = model.frames(q), np.arange(len(model.pairs))
     exact = model.pair_distances(frames).distance
@@ -60,8 +60,8 @@ def test_balls_and_covering_spheres_bound_the_distances_from_below(seed: int) ->
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("within", [-np.inf, 0.0, 0.1])
 def test_pairs_that_may_be_near_are_left(seed: int, within: float) -> None:
-    """From nothing, and from bounds known before: those whose bounds of balls, known bounds and
-    bounds of covering spheres are all near enough.
+    """With and without known bounds: a pair remains if its bounds of balls, known bounds and bounds
+    of covering spheres are all small enough.
     """
     model, q = in_cell(seed, 60)
     frames, pairs = model.frames(q), np.arange(len(model.pairs))[::2]
@@ -113,8 +113,8 @@ def test_a_normal_separates_at_both_configurations() -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_distances_bounded_by_earlier_ones_are_those_that_count(seed: int) -> None:
-    """Whatever was computed before, all distances up to the gradient distance are exact, and the
-    others are lower bounds.
+    """For any earlier results, all distances up to the gradient distance are exact, and the others
+    are lower bounds.
     """
     model, q = in_cell(seed, 60)
     rng = np.random.default_rng(seed)
@@ -135,8 +135,8 @@ def test_distances_bounded_by_earlier_ones_are_those_that_count(seed: int) -> No
 
 @pytest.mark.parametrize("within", [0.1, np.inf])
 def test_a_configuration_that_is_no_number_is_never_clear(within: float) -> None:
-    """Its distances are no numbers, and the others are what they are without it; nor is there an
-    error without any configuration.
+    """Its distances are NaN, and the other configurations are unaffected; zero configurations are
+    no error.
     """
     model, q = in_cell(1, 3)
     frames = model.frames(q)

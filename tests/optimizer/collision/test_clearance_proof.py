@@ -1,5 +1,5 @@
-"""The proof over continuous time, against replays on a grid of 0.1 ms and motions whose clearance
-is known.
+"""The proof over continuous time, against replays on a grid of 0.1 ms and motions of known
+clearance.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ OBSTACLES: list[Shape] = [
 
 
 def replayed(model: CollisionModel, spline: Spline, within: float) -> float:
-    """Least distance on a grid of 0.1 ms; what is further than `within` only counts by its bounding
+    """Least distance on a grid of 0.1 ms; bodies farther than `within` count by their bounding
     balls.
     """
     t = np.linspace(0, spline.duration, round(spline.duration / REPLAY) + 1)
@@ -59,7 +59,7 @@ def replayed(model: CollisionModel, spline: Spline, within: float) -> float:
 
 
 def smooth_cell(seed: int) -> Scene:
-    """Obstacles whose distances are closed forms: the replay is as exact as the proof."""
+    """Obstacles with closed forms of distance: the replay is as exact as the proof."""
     return Scene([o for o in cell(seed).obstacles if not o.name.endswith(("2", "4"))])
 
 
@@ -72,7 +72,8 @@ def test_proven_clearance_is_just_below_the_replay(seed: int, crowded: bool) -> 
     assert proof is not None
     least = replayed(model, spline, within=max(proof.sampled, 0) + 0.01)
     assert proof.min_clearance <= least + ROUNDING
-    # the replay misses the least by what moves in half its step: micrometres, at its flat bottom
+    # the replay misses the least distance by the motion in half its step: micrometres at the flat
+    # minimum
     assert least <= proof.sampled + 1e-5
     gap = max(CLEARANCE_PROOF.gap, CLEARANCE_PROOF.relative_gap * abs(proof.sampled))
     assert proof.sampled - proof.min_clearance <= gap + ROUNDING
@@ -123,7 +124,7 @@ def test_a_touch_between_samples_is_found() -> None:
     """
     spline = wander(3, duration=0.4, spread=0.0)
     model = CollisionModel(Arm(robot=ROBOT))
-    # in the middle of one of the 32 intervals that the proof starts from
+    # in the middle of one of the proof's 32 initial intervals
     middle = positions(spline, np.array([0.4 * 16.5 / 32]))
     wrist = model.frames(middle)[0, 5, :3, 3]
     proof = proven_clearance(

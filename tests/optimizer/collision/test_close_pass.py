@@ -18,7 +18,7 @@ from joulepath.optimizer.motion.time_scalings import quintic_spline
 from tests.optimizer.cells import at
 from tests.optimizer.moves import ROBOT
 
-# the pan joint alone turns: what is on its axis keeps its distance from the arm
+# only the pan joint turns: bodies on its axis keep their distance from the arm
 START = np.array([-0.5, -1.4, 1.6, -1.7, -1.57, 0.0])
 GOAL = START + np.array([1.0, 0, 0, 0, 0, 0])
 MOTION = quintic_spline(START, GOAL, 1.0)
@@ -117,7 +117,7 @@ def test_nothing_is_compared_without_collisions() -> None:
     ("distance", "margin", "is_close"), [(1e-3, 0.0, True), (1e-3, 5e-3, False), (3e-3, 0, False)]
 )
 def test_a_given_motion_is_sampled(distance: float, margin: float, is_close: bool) -> None:
-    """Of an obstacle with a margin it is `nearest` that says whether the margin is kept."""
+    """For an obstacle with a margin, `nearest` states whether the margin is kept."""
     motion = Waypoints(np.array([START, GOAL]), np.array([1.0]), "quintic", 0)
     result = evaluate(on_the_axis(distance, margin), motion)
     assert result.nearest is not None

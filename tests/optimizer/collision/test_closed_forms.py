@@ -1,5 +1,5 @@
-"""Distances of segments and boxes against slow ways to the same, above all where they degenerate;
-and the cores of shapes.
+"""Distances of segments and boxes, and cores of shapes, against slow reference methods, mainly in
+degenerate cases.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def segments(kind: str, seed: int) -> tuple[Array, Array]:
 
 
 def nearest_of_candidates(a: Array, b: Array) -> Array:
-    """The least distance (k,) [m] between ends and segments, and between the lines where that is
-    inside of both.
+    """The least distance (k,) [m] between ends and segments, and between the lines if both nearest
+    points are inside the segments.
     """
     found = [to_segment(p, s) for p, s in ((a[:, 0], b), (a[:, 1], b), (b[:, 0], a), (b[:, 1], a))]
     u, v, w = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0], a[:, 0] - b[:, 0]
@@ -84,7 +84,7 @@ def test_segments(kind: str) -> None:
     assert to_segment(r, b).max() < EXACT
     apart = distance > 1e-6
     assert to_segment(r - distance[:, None] * normal, a)[apart].max(initial=0.0) < EXACT
-    # the normal of those that cross is perpendicular to both
+    # the normal of crossing segments is perpendicular to both
     u, v = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0]
     crossing = (distance < 1e-10) & (np.linalg.norm(np.cross(u, v), axis=1) > 1e-3)
     assert crossing.any() == (kind in ("crossing", "on a grid"))
@@ -111,7 +111,7 @@ def test_box_and_segment(kind: str) -> None:
         low, high = np.where(nearer, low, thirds[0]), np.where(nearer, thirds[1], high)
     least = from_box(half, at(b, (low + high) / 2))
     distance, normal, point = box_segment(half, b)
-    # two thirds that differ by rounding alone leave the least by the root of it
+    # two thirds that differ by rounding alone change the least distance by its square root
     assert np.abs(np.maximum(distance, 0.0) - least).max() < 1e-7
     assert (distance <= least + EXACT).all()
     assert to_segment(point, b)[distance > 0].max() < EXACT

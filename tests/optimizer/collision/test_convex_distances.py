@@ -1,5 +1,5 @@
 """Distances of convex cores by the C library: certified by the separation along their normals, in
-closed form where faces are parallel, and Coal's where cores overlap.
+closed form for parallel faces, and by Coal for overlapping cores.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def box(size: Array) -> Core:
 
 
 def drawn(kind: str, rng: np.random.Generator) -> Core:
-    """A core whose size is between a millimetre and a few metres."""
+    """A core of a size between a millimetre and a few metres."""
     size = 10 ** rng.uniform(-3, 0.5)
     match kind:
         case "hull":
@@ -58,8 +58,8 @@ def of(first: list[Body], second: list[Body]) -> PairGeometry:
 @pytest.mark.parametrize("kind", ["hull", "needle", "plate", "triangle", "cylinder", "box"])
 @pytest.mark.parametrize("other", ["hull", "plate", "cylinder"])
 def test_no_unit_vector_separates_by_more_and_the_normal_by_as_much(kind: str, other: str) -> None:
-    """The separation along a unit vector never exceeds the distance, so that a distance that its
-    own normal attains is the distance. The witness point is on the second core."""
+    """The separation along a unit vector never exceeds the distance, so a separation along the
+    normal equal to the computed value proves it. The witness point is on the second core."""
     rng = np.random.default_rng(7)
     cores = [[drawn(each, rng) for _ in range(COUNT)] for each in (kind, other)]
     bodies = [
@@ -92,7 +92,7 @@ def _outside(core: Core, point: Array) -> float:
 @pytest.mark.parametrize("gap", [1e-9, 1e-6, 1e-3, 0.3, 100.0])
 @pytest.mark.parametrize("shift", [0.0, 0.05, 0.1, 0.3])
 def test_parallel_faces(gap: float, shift: float) -> None:
-    """Boxes one above the other, also with faces that share an edge line, or none."""
+    """Boxes above one another; seen from above, they overlap, share an edge line, or are apart."""
     size = np.array([0.1, 0.2, 0.3])
     T = np.eye(4)
     T[:3, 3] = [shift, 0.0, 0.3 + gap]

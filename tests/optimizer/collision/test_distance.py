@@ -1,5 +1,5 @@
-"""Distances against Coal, their gradients against finite differences, and which pairs are
-compared."""
+"""Distances against Coal, gradients against finite differences, and the selection of compared
+pairs."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def configurations(count: int, seed: int = 5) -> Array:
 
 
 def by_coal(model: CollisionModel, q: Array) -> Array:
-    """Signed distances (n, p), a pair at a time; half-spaces as Coal has them."""
+    """Signed distances (n, p), a pair at a time; half-spaces as in Coal."""
     request = coal.DistanceRequest(True, True)
     request.gjk_tolerance = request.epa_tolerance = 1e-12
     request.gjk_max_iterations = request.epa_max_iterations = 2000
@@ -91,7 +91,7 @@ def test_gradients(load: Shape) -> None:
     for j in range(6):
         step = STEP * np.eye(6)[j]
         (above, _), (below, _) = model.signed_distances(q + step), model.signed_distances(q - step)
-        # across a kink, as where the nearest edge changes, the two sides differ
+        # at a kink, such as a change of the nearest edge, the two sides differ
         smooth = np.abs(above - 2 * distance + below) < 1e-9
         error = np.abs((above - below) / (2 * STEP) - gradient[:, :, j])
         closed = smooth & model.geometry.is_closed_form
@@ -161,8 +161,8 @@ def test_what_is_compared() -> None:
 
 @pytest.mark.parametrize("touches", [(), ("wrist_3",), ("wrist_2", "wrist_3"), ("forearm",)])
 def test_what_touches_by_design_is_not_compared(touches: tuple[str, ...]) -> None:
-    """Declared for each body: another capsule of the tool touches the last link, as it does unless
-    told otherwise.
+    """Declared per body: another capsule of the tool touches the last link, unless declared
+    otherwise.
     """
     ends = np.zeros(3), np.array([0, 0, 0.1])
     loaded = Arm(
@@ -198,8 +198,8 @@ def test_nothing_to_compare(capsules: int) -> None:
 
 @pytest.mark.parametrize("size", [4e-4, 0.3, 90.0])
 def test_any_depth_has_a_distance_and_a_normal(size: float) -> None:
-    """Deep inside round bodies Coal's search may end nowhere: what is given instead is no more than
-    the distance.
+    """Deep inside round bodies Coal's search may fail; the returned value never exceeds the
+    distance.
     """
     corners = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T * size / 2
     shapes: list[Shape] = [

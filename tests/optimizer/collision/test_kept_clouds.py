@@ -11,7 +11,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.collision.clouds import CLOUDS, cloud_of
 from joulepath.optimizer.problem.clouds import Points
 
-# clouds that fill the cache
+# number of clouds in a full cache
 FIT = 4
 
 

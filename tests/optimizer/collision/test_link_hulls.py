@@ -1,5 +1,5 @@
-"""Links with hulls: what obstacles are compared with, and how near their distances are to those
-from the meshes.
+"""Links with hulls: the bodies compared with obstacles, and their distances against distances of
+the meshes.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def test_a_link_called_as_the_tool_is_compared_with_obstacles() -> None:
 
 
 def test_without_obstacles_there_are_no_hulls() -> None:
-    """The links are compared with each other by the same capsules as without hulls."""
+    """Links are compared with one another by capsules, with and without hulls."""
     with_hulls, without = (
         CollisionModel(Arm(robot=robot)) for robot in (ROBOT, replace(ROBOT, hulls=()))
     )
@@ -91,7 +91,8 @@ def test_links_are_compared_by_hulls_if_the_robot_says_so() -> None:
     for joint in range(6):
         moved = [model.signed_distances(q + sign * step * np.eye(6)[joint])[0] for sign in (1, -1)]
         difference = (moved[0] - moved[1]) / (2 * step)
-        # a step across an edge, where the nearest point changes, is not differentiable
+        # a step across an edge changes the nearest point, and the distance is not differentiable
+        # there
         error = np.abs(difference - gradient[:, :, joint])[apart]
         assert np.quantile(error, 0.99) < 1e-6
 

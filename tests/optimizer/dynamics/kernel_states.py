@@ -16,7 +16,7 @@ from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, problem
 NODES = 40
 TORQUE = 1e-9  # N·m, as symbolic inverse dynamics against Pinocchio
 
-# the UR5e's inverter loss is unknown and zero: give it one, so that its terms are seen
+# the UR5e's inverter loss is unknown and zero: a positive one makes its terms visible
 LOSSY = replace(
     ROBOT.drives,
     inverter_constant=np.full(6, 0.7),
@@ -51,11 +51,12 @@ def places(name: str, nq: int = 6) -> Array:
 
 
 def left_out(kernel: Kernel, y: Array, weight: Array, p: Array, dry: Array) -> Array:
-    """What the kernel's Hessians (N, 18, 18) leave out, with dry friction (N, 6) or (6,) [N·m] of
-    full size.
+    """The terms omitted from the kernel's Hessians (N, 18, 18), for dry friction (N, 6) or (6,)
+    [N·m] of full size.
 
-    The second derivative by v of dry · v / sqrt(v² + KNEE²), times what friction costs, where it is
-    concave. The cost's slope by the parameter `coulomb` tells what friction costs.
+    It is the second derivative by v of dry · v / sqrt(v² + KNEE²), times the cost of friction, in
+    its concave range. The cost of friction is the slope of the total cost by the parameter
+    `coulomb`.
     """
     v, step = y[:, 6:12], 1e-6
     size = np.sqrt(v**2 + SMOOTHING.knee**2)

@@ -23,7 +23,7 @@ PANELS = 20_000
 
 
 def error(prepared: PreparedProblem, spline: Spline) -> float:
-    """Relative difference of a motion's electrical energy from that of a fine quadrature."""
+    """Relative difference of a motion's electrical energy from a fine quadrature."""
     t, weights = quadrature(spline.knots, 5, spline.duration / PANELS)
     q, v, a = sample(spline, t)
     gain = prepared.potential(spline.control_points[-1]) - prepared.potential(

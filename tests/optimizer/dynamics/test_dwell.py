@@ -104,8 +104,8 @@ def test_its_pieces_are_its_value(dwell: Dwell) -> None:
 
 @pytest.mark.parametrize("name", long_but(("late brakes",), DWELLS))
 def test_no_duration_is_better(name: str) -> None:
-    """Brute force: motions optimised for fixed durations, each with its wait by hand; certified,
-    above the bound.
+    """Brute force: motions optimised for fixed durations, with the remaining wait added by hand;
+    certified, above the bound.
     """
     dwell = DWELLS[name]
     found = solved(dwell)
@@ -136,7 +136,7 @@ def test_braking_early_pays_where_holding_is_dear() -> None:
 
 
 def test_baselines_wait_too() -> None:
-    """Each in the time that it leaves; without the wait they are what they were."""
+    """Every baseline waits for the remaining time; without the wait it is unchanged."""
     dwell = DWELLS["cheap brakes"]
     with_wait, alone = solved(dwell), solved(None, solved(dwell).duration)
     ours = with_wait.energy.electrical.total

@@ -123,8 +123,8 @@ def test_payload_hangs_from_the_flange(symbolic: ca.Function) -> None:
 
 
 def test_the_flange_may_be_turned() -> None:
-    """The UR5e's flange is parallel to its last link; on an arm where it is not, com and inertia
-    turn with it.
+    """The UR5e's flange is parallel to its last link; with another flange, com and inertia turn
+    with it.
     """
     rng = np.random.default_rng(4)
     model = ROBOT.model.copy()

@@ -1,5 +1,5 @@
-"""The per-node functions: against Pinocchio, plain formulas and finite differences; each thread's
-memory.
+"""The per-node functions against Pinocchio, plain formulas and finite differences; memory per
+thread.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def test_compiled_equals_interpreted(
     [1, kernel.KERNEL.chunk_nodes - 1, kernel.KERNEL.chunk_nodes, kernel.KERNEL.chunk_nodes + 1],
 )
 def test_torques_are_pinocchios(compiled: Kernel, count: int) -> None:
-    """Whatever the number of samples, with payload and tilted gravity."""
+    """For any number of samples, with payload and tilted gravity."""
     y = states(3, count)
     q, v, a = y[:, :6], y[:, 6:12], y[:, 12:]
     ours = compiled.torque(q, v, a, TASK.parameters())
@@ -123,10 +123,10 @@ def differences(function: str, interpreted: Kernel, y: Array, p: Array) -> list[
 
 @pytest.mark.parametrize("weights", OBJECTIVES, ids=str)
 def test_derivatives_are_the_slopes(compiled: Kernel, weights: dict[str, float]) -> None:
-    """First derivatives against differences of the values, second ones against differences of the
-    first.
+    """First derivatives against differences of the values, second derivatives against differences
+    of the first.
 
-    Without what friction's reversal makes concave.
+    The concave terms of friction reversal are left out.
     """
     y, p = states(5), TASK.parameters(**weights)
     weight, multiplier = np.linspace(0.5, 1.5, NODES), multipliers()

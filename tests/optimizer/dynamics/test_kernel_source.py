@@ -1,5 +1,5 @@
-"""The C of the kernels: any number of nodes, several at once, to the last bit what the virtual
-machine gives.
+"""The C code of the kernels: for any number of nodes, singly or in parallel, results are bitwise
+equal to the virtual machine's.
 """
 
 from __future__ import annotations

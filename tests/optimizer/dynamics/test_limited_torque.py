@@ -1,6 +1,4 @@
-"""The side that a torque limit is for: of the link, neither rotor nor friction counts, in every
-place that looks.
-"""
+"""The side of a torque limit: for a limit of the link, all modules leave out rotor and friction."""
 
 from __future__ import annotations
 
@@ -73,8 +71,8 @@ def test_the_energy_is_that_of_the_motor_all_the_same() -> None:
 
 
 def test_derivatives_are_the_slopes() -> None:
-    """As in test_kernel, of the torque at the link: first ones against values, second ones against
-    first ones.
+    """As in test_kernel, for the torque at the link: first derivatives against values, second
+    derivatives against first ones.
     """
     kernel = Kernel(LINK, Interpreted(build(LINK)))
     p = PreparedProblem.of(problem(robot=LINK, payload=PAYLOAD, gravity=TILTED)).parameters(

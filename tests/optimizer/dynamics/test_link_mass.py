@@ -62,8 +62,8 @@ def test_unscaled_is_the_robot_itself() -> None:
 
 
 def test_a_lighter_arm_draws_less() -> None:
-    """Certified against the scaled model, above its bound; and lifting, each step of weight
-    costs."""
+    """Certified with the scaled model, above its bound; for lifting, every increase of mass costs
+    energy."""
     compile_kernel(ROBOT)
     totals = []
     for scale in (0.5, 1.0, 1.5):

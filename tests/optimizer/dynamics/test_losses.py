@@ -23,7 +23,7 @@ IDENTITY_TOLERANCE = (
 )
 HAND_TOLERANCE = 1e-12  # relative; a few operations in double precision
 
-# the UR5e's inverter loss is unknown and zero: give it one, so that its terms are seen
+# the UR5e's inverter loss is unknown and zero: a positive one makes its terms visible
 LOSSY = replace(
     ROBOT.drives,
     inverter_constant=np.full(6, 0.7),
@@ -57,8 +57,8 @@ def closed_motion(
 @pytest.mark.parametrize("regeneration", [0.0, 0.35, 1.0])
 @pytest.mark.parametrize("amplitude", [0.2, 0.5])
 def test_parts_add_up_over_a_closed_motion(regeneration: float, amplitude: float) -> None:
-    """Back where it began, neither potential nor kinetic energy has changed: every joule is a
-    loss."""
+    """At the start configuration again, potential and kinetic energy are unchanged: every joule is
+    a loss."""
     weights, q, v, a = closed_motion(duration=2.0, amplitude=amplitude)
     electronics = replace(ROBOT.electronics, controller_power=11.0, regeneration=regeneration)
     energy = breakdown(
@@ -94,7 +94,7 @@ def test_parts_add_up_over_a_closed_motion(regeneration: float, amplitude: float
     ids=lambda bus: f"{bus.mode} {bus.efficiency}",
 )
 def test_a_part_that_is_zero_has_no_sign(bus: Bus) -> None:
-    """No answer shows -0.0: neither without any power at all nor where nothing is regenerated."""
+    """No answer shows -0.0, neither without any power nor without regeneration."""
     off = replace(ROBOT.electronics, idle_power=0.0, controller_power=0.0, regeneration=0.0)
     weights, q, v, a = closed_motion(duration=2.0, amplitude=0.5, samples=40)
     asked = replace(arm(ROBOT.drives, off), bus=bus)
@@ -110,8 +110,8 @@ def test_a_part_that_is_zero_has_no_sign(bus: Bus) -> None:
 
 
 def test_constant_power_by_hand() -> None:
-    """One second at constant speed and torque: each term from its own formula, UR5e figures written
-    out.
+    """One second at constant speed and torque: every term by its own formula, with the UR5e's
+    figures.
     """
     v, tau = np.zeros((2, 6)), np.zeros((2, 6))
     v[:, 0], tau[:, 0] = 1.5, 20.0
@@ -147,8 +147,8 @@ def test_surplus_is_burnt_or_returned(regeneration: float, drawn: float) -> None
 
 
 def test_smoothing_is_an_upper_bound_that_vanishes_with_its_width() -> None:
-    """sqrt(x² + w²) lies above |x| by at most w (at zero), so the optimiser never sees less than
-    what is reported.
+    """sqrt(x² + w²) exceeds |x| by at most w (at zero), so the optimiser's cost is never below the
+    reported one.
     """
     net = np.linspace(-80.0, 120.0, 2001)
     for regeneration in (0.0, 0.35):

@@ -20,12 +20,12 @@ from tests.selection import long_but
 
 # relative; the bound stops at 1e-6 of the limit, and these motions use a third of a limit or more
 SHARP = 4e-6
-# N·m; of a joint that carries nothing
+# N·m; of a joint without load
 ROUNDING = 1e-9
 # relative; a sampling of 1 ms misses the peak at a reversal by the slope of the torque times half a
 # millisecond
 MISSED = 1e-3
-# s; dense samples, in which friction's step (1e-3 rad/s) takes a hundred samples at 10 rad/s²
+# s; dense samples: at 10 rad/s², friction's step (1e-3 rad/s) spans a hundred samples
 DENSE = 1e-6
 
 
@@ -86,8 +86,7 @@ def test_the_certificate_refuses_a_peak_between_its_samples() -> None:
         if missed.max() > MISSED:
             break
     joint = int(np.argmax(missed))
-    # torques at all samples are within the limits, the peak of this joint between two of them is
-    # not
+    # torques at all samples are within the limits, but this joint's peak between two samples is not
     tau_max = np.full(6, 1e6)
     tau_max[joint] = sampled[joint] * (1 + missed[joint] / 2)
     robot = replace(prepared.arm.robot, limits=replace(prepared.arm.robot.limits, tau_max=tau_max))

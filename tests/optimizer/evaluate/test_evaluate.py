@@ -36,7 +36,7 @@ POINTS = np.array([START, VIA, GOAL])
 TIMES = np.array([1.1, 1.7])
 ARM = Arm(robot=ROBOT, payload=PAYLOAD, gravity=TILTED)
 INTERPOLATIONS = ("linear", "trapezoid", "quintic", "spline")
-# of the trapezoidal rule on a grid of 0.5 ms, where friction and acceleration may jump between two
+# of the trapezoidal rule on a grid of 0.5 ms, with jumps of friction and acceleration between two
 # samples
 QUADRATURE = 5e-4
 # of one dynamics against the other [N·m]
@@ -78,7 +78,7 @@ def test_agrees_with_pinocchio(interpolation: str) -> None:
         (power, total(result)),
         (mechanical, result.total.energy.mechanical.total),
     ):
-        # each segment by itself: at a jump the sample is the later side's
+        # segments are integrated separately: at a jump the sample belongs to the later side
         cut = round(TIMES[0] / 5e-4)
         parts = [values[:cut], values[cut:]]
         sums = [np.trapezoid(part, dx=5e-4) for part in parts]
@@ -141,8 +141,8 @@ def test_a_velocity_step_violates_acceleration_and_needs_no_energy() -> None:
     assert not reports["acceleration"].held and not reports["jerk"].held
     assert reports["acceleration"].t == reports["jerk"].t == pytest.approx(TIMES[0])
     assert reports["velocity"].held and reports["torque"].held
-    # kinetic is what changes within the segments, at constant joint speed, not what jumps between
-    # them
+    # kinetic energy is the change within the segments, at constant joint speed, without the jumps
+    # between them
     parts = [each.kinetic_end - each.kinetic_start for each in result.segments]
     assert result.total.energy.electrical.kinetic == pytest.approx(sum(parts))
     assert result.segments[0].kinetic_end != pytest.approx(
@@ -285,7 +285,7 @@ def test_keeps_its_deadline() -> None:
     def at(first: float, later: float) -> Any:
         return chain([first], repeat(later)).__next__
 
-    # the clock is read at the start, and again and again before each block and within it
+    # the clock is read at the start, before every block and within it
     assert evaluate(ARM, motion("quintic"), deadline=2.0, clock=at(10.0, 11.9)).segment_count == 2
     with pytest.raises(DeadlineExceeded):
         evaluate(ARM, motion("quintic"), deadline=2.0, clock=at(10.0, 12.1))

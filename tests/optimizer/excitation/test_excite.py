@@ -135,7 +135,7 @@ def test_the_columns_give_pinocchios_torques() -> None:
 
 
 def test_load_friction_is_a_column() -> None:
-    """That of the rigid torque, the payload included; none at joints that carry little."""
+    """The column of the rigid torque, including the payload; none for joints with little load."""
     loaded = Arm(robot=ARM.robot, payload=Payload(4.0, np.array([0.0, 0.0, 0.1])))
     columns = TorqueColumns(loaded, ("friction",), 7)
     random = np.random.default_rng(3)

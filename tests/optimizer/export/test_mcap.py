@@ -1,4 +1,4 @@
-"""Recordings of ROS 2, read back by another library than the one that writes them."""
+"""Recordings of ROS 2, read back by a library independent of the writing one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is exported: steps that fit together, slowed down, certified again."""
+"""Exported programs: steps that fit together, slowed down, certified again."""
 
 from __future__ import annotations
 

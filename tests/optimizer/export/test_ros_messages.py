@@ -20,7 +20,7 @@ from tests.optimizer.export.programs import cycle_with_payload
 from tests.optimizer.export.read_back.joint_trajectories import deviations, followed
 from tests.optimizer.export.read_back.random_motions import arm_of, one_move
 
-# fields of the messages, as their definitions have them
+# fields of the messages, as in their definitions
 GOAL = {
     "trajectory",
     "multi_dof_trajectory",

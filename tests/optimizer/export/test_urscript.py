@@ -1,5 +1,4 @@
-"""URScript: the program, run by a small interpreter, serves the spline; it stops where it
-should."""
+"""URScript: run by a small interpreter, the program follows the spline and stops as specified."""
 
 from __future__ import annotations
 

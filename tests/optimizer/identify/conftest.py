@@ -11,7 +11,7 @@ from benchmarks.identification_logs import MISSING, folder
 
 @pytest.fixture(scope="session")
 def place() -> Path:
-    """The folder of the real logs; where there is none, the test is skipped."""
+    """The folder of the real logs; without it, the test is skipped."""
     found = folder()
     if found is None:
         pytest.skip(MISSING)

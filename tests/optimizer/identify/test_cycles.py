@@ -1,4 +1,4 @@
-"""Cycles that a log repeats, found by its path: against motions whose cycles are known."""
+"""Repeated cycles found in a log by its path, for motions with known cycles."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from joulepath.optimizer.problem.arm import Arm
 from tests.identification_logs import WITHOUT_SPLIT, recorded, truth_of
 
 RATE = 125.0
-# of the bounds of a cycle [s]: the ends of a rest are found late, where they are noisy
+# of the bounds of a cycle [s]: noise delays the detected end of a rest
 BOUNDS = 0.12
 _RANDOM = np.random.default_rng(3)
 HOME, PICK, PLACE, SIDE = (_RANDOM.uniform(-1.2, 1.2, 6) for _ in range(4))
@@ -41,7 +41,7 @@ class Shop:
 
 
 def log_through(stops: list[Array], shop: Shop = Shop()) -> tuple[Log, list[float]]:
-    """A log of quintic moves, and the times at which they begin [s]."""
+    """A log of quintic moves, and their start times [s]."""
     random, parts, begins = np.random.default_rng(1), [np.tile(stops[0], (60, 1))], list[float]()
     for k, (one, other) in enumerate(pairwise(stops)):
         begins.append(sum(map(len, parts)) / RATE)
@@ -158,7 +158,7 @@ def test_held_out_cycles_are_compared_as_the_sum_of_their_moves() -> None:
     assert found.coverage == np.mean([each.covered for each in found.energies])
     one, again = (each.start for each in found.cycles[:2])
     assert one < found.energies[4].start == again
-    # moves have errors of their own beside those of the figures, which they share
+    # moves have errors of their own besides the shared errors of the figures
     widths = [each.p95 - each.p5 for each in found.energies[:4]]
     whole = found.cycles[0].p95 - found.cycles[0].p5
     assert max(widths) < whole < sum(widths)

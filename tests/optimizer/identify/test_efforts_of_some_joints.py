@@ -32,7 +32,7 @@ def table(form: str = "own", **options: str) -> list[list[str]]:
 
 
 def without(rows: list[list[str]], dropped: str) -> list[list[str]]:
-    """The table without the effort columns of this name, except that of the elbow."""
+    """The table without the effort columns of this name, except the elbow's."""
     head = rows[0]
     gone = {k for k, name in enumerate(head) if name.startswith(dropped)}
     gone.discard(sorted(gone)[ELBOW])
@@ -69,7 +69,7 @@ def by_name() -> LogReading:
 
 
 def by_constants() -> LogReading:
-    """As of a driver that writes the same number for what it does not measure."""
+    """Efforts of a driver with constant numbers for unmeasured joints."""
     current = np.tile(RECORDING.current[:1], (len(RECORDING.time), 1))
     current[:, ELBOW] = RECORDING.current[:, ELBOW]
     return read_log(csv_of(with_current(RECORDING, current), without="aP"), ROBOT, NOTHING)
@@ -138,7 +138,7 @@ def test_efforts_of_no_joint_and_of_a_wrist_alone_are_refused() -> None:
     columns = {"time": 1, "q": [2, 3, None, 5, 6, 7]}
     with pytest.raises(InvalidProblem, match="efforts may be null"):
         read_log(body_of(rows), ROBOT, replace(NOTHING, columns=columns))
-    # no other joint tells what the effort of a wrist is
+    # no other joint determines the quantity of a wrist's effort
     effort = {"time": 1, "q": [2, 3, 4, 5, 6, 7], "effort": [None] * 5 + [14]}
     with pytest.raises(EffortNotUsable):
         read_log(body_of(rows), ROBOT, replace(NOTHING, columns=effort))

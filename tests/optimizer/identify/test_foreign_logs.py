@@ -1,5 +1,4 @@
-"""Logs as other programs write them: each form is read, or refused with the place and the
-remedy."""
+"""Logs in the formats of other programs are read, or refused with the place and the remedy."""
 
 from __future__ import annotations
 
@@ -161,8 +160,8 @@ def test_units_that_are_named_and_not_read(recording: Recording, unit: str, belo
 
 
 def test_joint_states_as_ros_2_prints_them(recording: Recording) -> None:
-    """`ros2 topic echo --csv` prints no header, and the joints in the driver's order, with those of
-    a gripper.
+    """`ros2 topic echo --csv` prints no header, and the joints in the driver's order, mixed with
+    joints of a gripper.
     """
     joints = [*sorted(ROBOT.joint_names), "finger_joint"]
     order = [ROBOT.joint_names.index(joint) for joint in joints[:-1]]
@@ -204,7 +203,7 @@ def test_exports_of_recorded_topics(recording: Recording) -> None:
 
 
 def test_a_log_of_libfranka(seven: Recording) -> None:
-    """Milliseconds, torques at the joints, and other quantities beside them."""
+    """Milliseconds, joint torques, and further quantities."""
     words = ("q", "q_d", "dq", "tau_J", "tau_J_d", "tau_ext_hat_filtered")
     header = ["time", "success_rate", *numbered("state.{}[{}]", words, 7)]
     zeros = np.zeros_like(seven.q)

@@ -1,5 +1,5 @@
-"""Figures that a log does not change or hardly determines, with their standard deviations: of
-joints that rest, of engineering defaults, and of logs that tell little."""
+"""Figures unchanged or hardly determined by a log, with their standard deviations: joints at rest,
+engineering defaults, and logs with little information."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STILL = 5
 
 
 def log_of(still: int | None) -> Log:
-    """A log of currents and power, perhaps with a joint that does not move."""
+    """A log of currents and power, optionally with a joint at rest."""
     log = recorded(ROBOT, truth_of(ROBOT, 4), moves=10, seed=4).log()
     if still is None:
         return log
@@ -120,9 +120,9 @@ def test_errors_of_held_figures_move_the_others_as_far_as_a_fit_with_such_errors
 
 @pytest.mark.long
 def test_base_parameters_count_the_errors_of_figures_that_are_held() -> None:
-    """Of units that are as far from engineering defaults as these promise, the figures found beside
-    held ones are within three standard deviations. Without the errors of held figures, 3 of 57 are
-    not, by up to 7."""
+    """For units as far from engineering defaults as the defaults' ranges state, figures found
+    beside held ones are within three standard deviations. Without the errors of held figures, 3 of
+    57 are not, by up to 7."""
     arm, names = load_robot("gen3"), ("coulomb", "viscous", "rotor_inertia")
     distance, held = list[float](), 0
     for seed in range(5):
@@ -166,8 +166,7 @@ def relettered(section: dict[str, dict[str, object]], letter: str) -> dict[str, 
 
 
 def log_of_little_friction(seed: int) -> Log:
-    """A short, noisy log of a unit whose last joint has a tenth of the default of its Coulomb
-    friction."""
+    """A short, noisy log of a unit with a tenth of the default Coulomb friction in its last joint."""
     truth = truth_of(ARM, seed)
     coulomb = truth.coulomb.copy()
     coulomb[JOINT] = 0.1 * ARM.friction.coulomb[JOINT]

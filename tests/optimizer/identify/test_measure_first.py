@@ -1,4 +1,6 @@
-"""What to measure first: ten seconds at rest, a wattmeter, and what the interval asks for."""
+"""Recommended first measurements: ten seconds at rest, a wattmeter, and the main causes of the
+interval.
+"""
 
 from __future__ import annotations
 
@@ -106,7 +108,9 @@ def test_ten_seconds_at_rest_are_asked_for_where_no_power_was_logged() -> None:
 
 @pytest.mark.parametrize("channels", long_but(["currents"], ["currents", "power"]))
 def test_a_known_figure_takes_its_share_out_of_the_interval(channels: str) -> None:
-    """Against the intervals of answers, of the document and of one in which the figure is known."""
+    """Against the intervals of answers, of the document and of a document with the figure known
+    exactly.
+    """
     log = recorded(ROBOT, TRUTH, moves=8).log()
     log = replace(log, power=None) if channels == "currents" else _of_power(log)
     found = identify(ROBOT, [log], WITHOUT_SPLIT)
@@ -125,7 +129,7 @@ def _of_power(log: Log) -> Log:
 
 
 def _exact(robot: Robot, path: str) -> Robot:
-    """The robot, one of whose figures is known exactly, and others by their correlation with it."""
+    """The robot with one figure known exactly, and correlated ones adjusted accordingly."""
     own = robot.figures["covariance"]
     if path in own["names"]:
         at, matrix = own["names"].index(path), np.array(own["matrix"])

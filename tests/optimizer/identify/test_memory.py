@@ -50,7 +50,7 @@ print(len(log.time), peak() - before)
 """
 
 # bytes of the whole process, from the file to the figures: with 26 columns on a uniform grid, and
-# with 33 whose times jitter, so that they are interpolated
+# with 33 columns interpolated because their times jitter
 MOST_OF_ALL = {"own": 480e6, "rtde": 500e6}
 ROWS = 1_000_000
 FROM_FILE = f"""{PEAK}
@@ -68,7 +68,7 @@ print(len(log.time), peak())
 
 
 def lines(form: Form) -> Iterator[str]:
-    """Of a log with all channels, which repeats the same moves; the times of RTDE jitter."""
+    """A log with all channels and repeated moves; the times of RTDE jitter."""
     robot = load_robot("ur10e")
     short = (
         csv_of(recorded(robot, truth_of(robot), moves=30, rate=500.0, closed=True), form)
@@ -96,7 +96,7 @@ def test_a_million_rows_of_a_file_are_refitted_within_memory(tmp_path: Path, for
 
 @pytest.mark.long
 def test_a_refit_of_a_million_rows_stays_within_memory() -> None:
-    """In a process of its own, whose peak counts nothing else."""
+    """In a separate process, so its peak includes nothing else."""
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], capture_output=True, text=True, check=True, cwd=ROOT
     )

@@ -1,4 +1,4 @@
-"""Gates on logs of two real arms: what no fit has seen is predicted as well as promised."""
+"""Accuracy on logs of two real arms: motions held out of the fit are predicted as promised."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from tests.identification_logs import power_errors, torque_errors
 
 
 def test_power_of_moves_that_no_fit_has_seen(place: Path) -> None:
-    """From motion alone, each motion left out in its turn: 2.0 W, and 1.3 % of the energy, 4 % at
-    most.
+    """From motion alone, leaving out one motion at a time: 2.0 W, and 1.3 % of the energy, at most
+    4 %.
     """
     robot, log = ur3e(place)
     found = identify(
@@ -45,6 +45,6 @@ def test_currents_tell_friction_that_the_factory_does_not_know(place: Path) -> N
 
 
 def test_published_friction_of_another_maker(place: Path) -> None:
-    """Friction and coupling of a TX40, of which the published values come from the same log."""
+    """Friction and coupling of a TX40; the published values were identified from the same log."""
     missed = [f"{each.what}: {each.value:.4g}" for each in tx40_torque(place, 0) if not each.kept]
     assert missed == []

@@ -1,5 +1,5 @@
-"""Logs that would give wrong figures: each is set right, warned of, or refused with its own
-cause."""
+"""Logs that would give wrong figures: corrected, reported by a warning, or refused with the
+specific cause."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def recording() -> Recording:
 
 
 def later(recording: Recording, lag: float) -> Recording:
-    """The recording with currents that come later than the motion [s]."""
+    """The recording with currents delayed by `lag` [s] behind the motion."""
     current = [
         np.interp(recording.time - lag, recording.time, channel) for channel in recording.current.T
     ]
@@ -114,7 +114,7 @@ def test_a_position_that_never_changes_contradicts_its_speeds(recording: Recordi
     with pytest.raises(InvalidTable, match="q3 never changes") as caught:
         read_log(csv_of(replace(recording, q=q), without="a"), ROBOT)
     assert caught.value.column == "q3"
-    # a joint that stands still has no speed
+    # the speed of a joint at rest is zero
     v = recording.v.copy()
     v[:, 2] = 0.0
     still = read_log(csv_of(replace(recording, q=q, v=v), without="ai"), ROBOT)
@@ -156,7 +156,7 @@ def test_joints_go_by_their_names_in_whatever_order_they_are(recording: Recordin
         np.testing.assert_allclose(reading.log.q, straight.q, atol=1e-8)
         np.testing.assert_allclose(reading.log.effort, straight.effort, atol=1e-6)
         assert not any("order" in each for each in reading.report.warnings)
-    # names in the rows, as a JointState has them
+    # names in the rows, as in a JointState
     header = ["time", *(f"{word}{k}" for word in words for k in range(6))]
     lines = table(header, recording.time, *parts).decode().splitlines()
     for prefix in ("", "left_", "cell/ur5e_"):
@@ -185,7 +185,7 @@ def test_a_channel_that_is_empty_counts_as_not_logged(recording: Recording) -> N
             "The columns of power are empty in the first row, and are not read."
             in reading.report.warnings
         )
-    # one that ends is an error, as it was
+    # a missing value at the end of the column remains an error
     body = "\n".join([*lines[:-1], lines[-1].rpartition(",")[0] + ",nan"]).encode()
     with pytest.raises(InvalidTable, match="p in line"):
         read_log(body, ROBOT)

@@ -33,7 +33,7 @@ def _estimates(seed: int) -> tuple[Array, Array, Array]:
     """
     random = np.random.default_rng(seed)
     group = np.repeat(np.arange(GROUPS), SIZE)
-    # one group alone tells the third parameter well: without it, the prior is what is left
+    # one group alone determines the third parameter: without it, the prior remains
     size = np.where(np.arange(GROUPS) == 0, 1.0, 0.02)[group]
     columns = random.normal(size=(len(group), 3)) * np.column_stack(
         [np.ones((len(group), 2)), size]
@@ -63,7 +63,7 @@ def test_adjusted_residuals_tell_the_error_where_leaving_a_group_out_says_too_mu
     def ratio(covariances: Array) -> Array:
         return np.asarray(np.sqrt(np.diagonal(covariances, axis1=1, axis2=2).mean(axis=0) / true))
 
-    # the share by which few groups are widened, for Student's distribution, is 9 %
+    # the factor for few groups, by Student's distribution, widens by 9 %
     assert (ratio(by_residuals) > 0.88).all() and (ratio(by_residuals) < 1.25).all()
     assert ratio(by_leaving_out)[2] > 1.3 * ratio(by_residuals)[2]
 
@@ -99,7 +99,7 @@ def test_energies_lie_in_their_interval_as_often_as_it_says(channels: str, effec
 
 
 def test_friction_of_other_days_is_known_joint_by_joint_and_never_too_well() -> None:
-    """Few logs happen to be alike; many whose joints differ say how much."""
+    """Few logs may agree by chance; many logs with different joints determine the spread."""
     alike = session_sd(np.ones((6, 2)))
     assert alike == pytest.approx(np.full(2, INTERVAL.min_session_sd * np.sqrt(7 / 6)))
     one, few = session_sd(np.ones((1, 2))), session_sd(np.ones((2, 2)))
@@ -113,7 +113,7 @@ def test_friction_of_other_days_is_known_joint_by_joint_and_never_too_well() -> 
 
 
 def test_moves_left_out_tell_what_the_model_lacks_where_only_currents_are_logged() -> None:
-    """Of an arm each of whose moves has a friction of its own, in all joints alike."""
+    """Every move of the arm has a friction of its own, equal in all joints."""
     robot = load_robot("ur10e")
     truth = truth_of(robot, 2)
     plain = replace(recorded(robot, truth, moves=16, seed=2).log(), power=None)
@@ -133,7 +133,7 @@ def test_moves_left_out_tell_what_the_model_lacks_where_only_currents_are_logged
 
 
 def test_friction_of_another_day_is_no_error_of_the_moves() -> None:
-    """It is part of the interval once, as that of the day."""
+    """The interval includes it once, as friction of the day."""
     robot = load_robot("ur10e")
     truth, found = truth_of(robot, 2), list[float]()
     for change in (0.0, 0.1):

@@ -71,7 +71,7 @@ def test_lines_that_end_with_carriage_returns_alone(ur: Recording) -> None:
 
 @pytest.mark.parametrize("name", ["fer_joint{}", "panda_joint{}", "joint_a{}", "lbr_A{}"])
 def test_rows_of_joint_states_with_names_of_other_makers(panda: Recording, name: str) -> None:
-    """As `ros2 topic echo --csv` prints them, with the joints in another order."""
+    """In the format of `ros2 topic echo --csv`, with the joints in another order."""
     order = [2, 0, 1, 3, 6, 5, 4]
     names = ",".join(name.format(k + 1) for k in order)
     lines = [
@@ -110,7 +110,7 @@ def test_a_nominal_clock_is_named_and_right_speeds_are_kept(ur: Recording) -> No
 
 
 def bag_of(recording: Recording, folder: Path, kind: str, prefix: str = "") -> Path:
-    """A bag with the states of an arm, and with those of a gripper on the same topic."""
+    """A bag with states of an arm and states of a gripper on the same topic."""
     types = get_typestore(Stores.ROS2_HUMBLE)
     state, stamp, head = (
         types.types[name]

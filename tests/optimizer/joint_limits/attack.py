@@ -1,4 +1,4 @@
-"""Motions within joint limits that come as near to the torque limits as can be found."""
+"""Motions within joint limits, searched for the largest torques relative to the torque limits."""
 
 from __future__ import annotations
 

@@ -18,10 +18,10 @@ from tests.selection import long_but
 
 NAMES = ("ur5e", "kr10_r1100", "panda")
 MOVES = 40
-# relative: jumps of jerk that become one change the jerk of short phases
+# relative: merged jumps of jerk change the jerk of short phases
 MOSTLY = {False: 1e-4, True: 1e-3}
 ALWAYS = 0.02
-# rad: a jump that is moved by a ten thousandth of the duration, at the greatest speed
+# rad: a jump shifted by a ten thousandth of the duration, at the greatest speed
 AWAY = 1e-3
 HARDLY = 0.5  # the same as ALWAYS, of moves of which some joints move by a billionth of others
 NEARLY = 1e-5  # relative, of limits that are nearly equal
@@ -61,7 +61,7 @@ def test_it_is_ruckigs_motion(name: str, nearly_equal: bool) -> None:
 
 @pytest.mark.parametrize("name", long_but(["kr10_r1100"], NAMES))
 def test_some_joints_hardly_move(name: str) -> None:
-    """Their phases of jerk are too short to be apart; each still ends where it should."""
+    """Their phases of jerk are too short to be separate; every joint still reaches its goal."""
     limits, rng, scales = load_robot(name).limits, np.random.default_rng(1), []
     for _ in range(MOVES):
         goal = rng.uniform(-2, 2, len(limits.q_min)) * 10.0 ** rng.uniform(-9, 0, len(limits.q_min))
@@ -85,7 +85,7 @@ def test_joints_that_stay() -> None:
     assert least_time_scale(spline, limits.rates) < 1 + ALWAYS
 
 
-# rad, rad/s, rad/s²: rounding of polynomials whose jerk is up to some 1e4 rad/s³
+# rad, rad/s, rad/s²: rounding of polynomials with a jerk of up to 1e4 rad/s³
 ROUNDING = 1e-10
 
 
@@ -110,7 +110,7 @@ def test_its_states_are_those_of_ruckig(robot: str) -> None:
 
 
 def test_a_joint_that_just_reaches_its_greatest_acceleration() -> None:
-    """There 0.05 rad are twice a³ / j²: of half of these moves Ruckig says that it has none."""
+    """At 0.05 rad = 2 a³ / j², Ruckig finds no solution for half of these moves."""
     limits = load_robot("ur5e").limits
     for first in np.round(np.arange(-3, 3, 0.25), 2):
         q_start = np.array([first, 0.0, 0.0, 0.0, 0.0, 0.0])

@@ -29,8 +29,8 @@ def test_times_of_points_on_a_curve_are_found() -> None:
 
 
 def test_passes_are_met_in_their_order() -> None:
-    """A motion there and back meets a configuration twice: asked for after the turn, it is that of
-    the way back.
+    """A motion there and back passes a configuration twice: after the turn, the pass on the way
+    back is found.
     """
     there = quintic_spline(np.zeros(6), np.ones(6), 1.0)
     back = quintic_spline(np.ones(6), np.zeros(6), 1.0)
@@ -40,7 +40,7 @@ def test_passes_are_met_in_their_order() -> None:
 
 
 def test_a_point_beside_the_curve_is_missed_by_its_distance() -> None:
-    """Nearest in the sum of squares; by the least that a fine search finds."""
+    """Nearest in the sum of squares, against the minimum of a fine search."""
     curve = wavy(1).curve
     beside = curve(1.2) + np.array([0, 0.05, 0, -0.05, 0.02, 0])
     t = np.linspace(0, 3, 30001)

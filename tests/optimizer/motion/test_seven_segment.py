@@ -81,7 +81,7 @@ def test_the_arm_takes_as_long_as_its_slowest_joint() -> None:
 
 
 def test_switches_are_ruckigs_at_the_shortest_duration() -> None:
-    """Of the joint that leads, where it reaches its acceleration limit; nowhere otherwise."""
+    """Switches of the leading joint at its acceleration limit; none otherwise."""
     rng = np.random.default_rng(4)
     seen = 0
     for _ in range(200):

@@ -1,4 +1,4 @@
-"""Splines in time: durations and rates that are met exactly, and quadrature over the knots."""
+"""Splines in time: durations and rates are met exactly; quadrature over the knots."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.optimizer.moves import GOAL, ROBOT, START, limits
 
 MOTION = time_optimal_spline(ROBOT.limits, START, GOAL)
 ROUNDING = 1e-12
-# relative; peaks of the jerk between samples, in spans that are not quintic at rest
+# relative; peaks of the jerk between samples, in spans other than a quintic at rest
 PEAK = 1e-6
 
 

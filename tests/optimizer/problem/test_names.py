@@ -1,4 +1,6 @@
-"""Names that a caller gives: plain text, each its own, and none that of the arm's own bodies."""
+"""Names given by a caller are plain text, unique, and different from the names of the arm's own
+bodies.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,7 @@ def scene(*names: str) -> Scene:
 def refused(error: pytest.ExceptionInfo[InvalidProblem], field: str, name: str) -> None:
     assert error.value.field == field
     assert "name" in str(error.value)
-    # a message repeats nothing of a request, but what is the arm's own anyway
+    # a message repeats nothing of a request except names of the arm itself
     assert len(name) < 8 or name not in str(error.value) or name.isidentifier()
 
 
@@ -96,7 +98,7 @@ def test_the_arms_own_names_are_taken(robot: Robot) -> None:
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 def test_every_name_of_an_answer_means_one_body(robot: Robot) -> None:
-    """What is accepted: the obstacles' names among all bodies' are theirs alone."""
+    """Accepted names of obstacles are unique among the names of all bodies."""
     names = ["tool rack", "wrist", "payload 2", "base plate", "link"]
     bodies = [body.name for body in bodies_of(Arm(robot=robot, scene=scene(*names)))]
     assert all(bodies.count(name) == 1 for name in names)

@@ -25,7 +25,7 @@ from joulepath.optimizer.problem.pose import (
 
 # of a rotation computed in double precision in two ways
 ROUNDING = 1e-14
-# the same for an angle near a half turn, where the rotation vector follows from the matrix by a
+# the same for an angle near a half turn, because the rotation vector follows from the matrix by a
 # square root
 ANGLE_ROUNDING = 1e-7
 POSITION = [0.1, -0.2, 0.3]

@@ -1,4 +1,4 @@
-"""What a problem and a branch filter accept; a refusal names the field as the contract does."""
+"""Values accepted by a problem and by a branch filter; refusals name the field by contract."""
 
 from __future__ import annotations
 
@@ -131,9 +131,7 @@ def test_joint_positions_outside_their_range_name_the_target(
 
 @pytest.mark.parametrize("name", ["v_max", "a_max", "j_max", "tau_max", "q_min", "q_max"])
 def test_nan_is_no_limit(name: str) -> None:
-    """NaN compares false with everything: a check that asks whether a limit is too large lets it
-    pass.
-    """
+    """NaN compares false with everything, so a check for too large limits would accept it."""
     values = getattr(ROBOT.limits, name).copy()
     values[3] = math.nan
     with pytest.raises(InvalidProblem):
@@ -178,7 +176,7 @@ def test_limits_may_be_the_robots_own_and_the_ends_on_them() -> None:
 
 
 def test_a_limit_that_a_refusal_names_is_accepted() -> None:
-    """Two thirds of pi rad/s are 2.09440 when rounded, which is above the limit."""
+    """Two thirds of pi rad/s round to 2.09440, which is above the limit."""
     robot = load_robot("ur10e")
     wide = replace(robot.limits, v_max=np.full(6, 3.0))
     with pytest.raises(InvalidProblem) as refusal:
@@ -208,7 +206,7 @@ def test_targets_may_be_lists_poses_and_mixed() -> None:
 
 
 def test_nothing_can_be_changed_afterwards() -> None:
-    """Neither fields nor the arrays in them, and the caller's own arrays stay the caller's."""
+    """Fields and their arrays are constant, and the caller's own arrays stay writable."""
     start = START.copy()
     task = problem(start=start)
     start[0] = 9.0
@@ -273,8 +271,8 @@ def test_a_pose_must_be_homogeneous() -> None:
     ids=str,
 )
 def test_a_payload_must_be_a_body(given: dict[str, Any], field: str) -> None:
-    """Positive mass, principal moments of inertia that some distribution of mass has, and a
-    symmetric tensor.
+    """Positive mass, a symmetric inertia tensor, and principal moments of a possible mass
+    distribution.
     """
     with refusal_of(field):
         Payload(**given)
@@ -301,7 +299,7 @@ LABELS = [
 
 @dataclass(frozen=True)
 class ElbowOnly:
-    """The label of an arm whose branches differ in the elbow alone."""
+    """Branch labels of an arm whose solutions differ in the elbow alone."""
 
     elbow: str
 

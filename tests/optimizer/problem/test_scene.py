@@ -1,4 +1,4 @@
-"""Shapes, scenes and even bodies: their moments, and what is refused with its field named."""
+"""Shapes, scenes and homogeneous bodies: their moments, and refusals that name the field."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def test_centre_and_inertia_are_those_of_the_shape_at_its_pose(
 
 
 def test_a_hull_may_lie_anywhere_about_its_origin() -> None:
-    """Two parts of a box, each about its own middle, make the box."""
+    """Two parts of a box, each about its own centre, have the moments of the box."""
     cut = np.array([0.0, 0.0, SIZE[2] / 2])
     parts = (SIZE * [1, 1, 0.75], SIZE * [1, 1, 0.25])
     middles = (-cut + [0, 0, parts[0][2] / 2], cut - [0, 0, parts[1][2] / 2])

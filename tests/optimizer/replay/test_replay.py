@@ -41,8 +41,8 @@ from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import GOAL, PAYLOAD, START, problem, tcp_pose
 from tests.refusals import refusal_of
 
-# what the documentation promises of feed-forward with PD at 0.25 ms: rad, m, and parts of the
-# energies
+# accuracy of feed-forward with PD at 0.25 ms, as promised by the documentation: rad, m, and shares
+# of the energies
 JOINT = 3e-4
 TCP = 2.5e-4
 ELECTRICAL = 5e-4
@@ -93,8 +93,7 @@ def holds_promise(found: Replay, plan: PlannedMotion) -> None:
 
 @pytest.mark.parametrize("name", ["ur5e", "panda", "kr10_r1100"])
 def test_the_plan_is_what_happens(name: str) -> None:
-    """Also of a robot whose torque limits are those of the links, and of one with large
-    friction."""
+    """Also for a robot with torque limits of the links, and for one with large friction."""
     arm = Arm(
         robot=load_robot(name),
         payload=Payload(mass=1.0, com=np.array([0.0, 0.02, 0.06])),
@@ -129,7 +128,7 @@ def test_joints_at_the_knee_of_friction_follow() -> None:
 
 
 def test_an_arm_at_rest_stays_there() -> None:
-    """Nothing chatters and nothing creeps where friction is steepest."""
+    """There is neither chatter nor creep at the steepest part of the friction law."""
     plan = quintic(ARM, START, START, 0.5)
     run = replay(plan, ("feed_forward",)).under("feed_forward")
     assert run.joint_error.max() < 1e-9
@@ -149,7 +148,7 @@ def test_an_obstacle_in_the_way_is_touched() -> None:
     assert run.contact is not None and run.collides
     assert run.contact.pair[0] == "box" or run.contact.pair[1] == "box"
     assert 0 < run.contact.time < 1.2
-    # it is pushed off its way, and that takes energy
+    # the obstacle pushes the arm off its path, at a cost of energy
     assert run.tcp_error > TCP
     # our own distances say so, too
     q = quintic(arm).course(np.array([0.6]))[0]
@@ -280,8 +279,8 @@ def memory() -> int:
 
 @pytest.mark.long
 def test_no_model_leaks() -> None:
-    """A model with its data has more than a hundred kilobytes: a hundred that stay would be
-    seen."""
+    """A model with its data has more than a hundred kilobytes: a hundred leaked models would be
+    visible."""
     plan = quintic(in_the_way(above=0.5), duration=0.2)
     for _ in range(20):
         replay(plan, step=1e-2, perturb={"payload": 0.1})

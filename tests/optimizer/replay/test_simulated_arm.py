@@ -58,7 +58,7 @@ def states(robot: Robot, count: int = 10) -> tuple[Array, Array, Array]:
 
 
 def loaded(robot: Robot) -> Arm:
-    """An arm that hangs askew, with a payload, lighter links and a tool centre point."""
+    """An arm in a tilted mounting, with a payload, lighter links and a tool centre point."""
     T = np.eye(4)
     T[:3, 3] = [0.02, -0.01, 0.12]
     scale = np.linspace(0.6, 1.4, robot.nq)
@@ -210,7 +210,7 @@ def test_the_arm_does_not_touch_itself_where_links_meet() -> None:
             q = rng.uniform(arm.active_limits.q_min, arm.active_limits.q_max)
             simulated.data.qpos[:] = q
             simulator.mj_forward(simulated.model, simulated.data)
-            # what is listed are touches, and touches are listed
+            # listed contacts are real, and real contacts are listed
             assert (simulated.data.ncon > 0) == (model.signed_distances(q[None])[0].min() < 0), name
 
 
@@ -231,7 +231,7 @@ def test_obstacles_of_many_parts_are_named() -> None:
 
 
 def test_only_a_replay_imports_mujoco() -> None:
-    """It takes 20 MB of memory in each process, which no other request has to pay."""
+    """It takes 20 MB of memory per process, which other requests do not need."""
     code = (
         "import sys, joulepath.app.main, joulepath.app.server, joulepath.app.api.replay.task\n"
         "import joulepath.optimizer.replay.replay\n"

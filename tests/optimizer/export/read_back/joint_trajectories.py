@@ -1,4 +1,4 @@
-"""What the joint trajectory controller of ros2_control makes of a message."""
+"""The motion made from a message by the joint trajectory controller of ros2_control."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ POINT = {"positions", "velocities", "accelerations", "effort", "time_from_start"
 
 
 def followed(trajectory: dict[str, Any]) -> BPoly:
-    """What the controller does: the quintic through position, velocity and acceleration at both
-    ends of a segment.
+    """The controller's interpolation: the quintic through position, velocity and acceleration at
+    both ends of a segment.
 
-    SciPy makes it from the Bernstein basis, apart from the formula in the library.
+    SciPy builds it from the Bernstein basis, independent of the library's formula.
     """
     assert trajectory.keys() <= {"header", "joint_names", "points"}
     points = trajectory["points"]

@@ -16,7 +16,7 @@ from joulepath.optimizer.export.facts import WrittenFile
 from joulepath.optimizer.export.program import Program
 
 NUMBER = r"-?\d+\.\d+"
-# the statements that the generated programs use, in the forms of the makers' manuals
+# the statements of the generated programs, in the forms of the makers' manuals
 RAPID = re.compile(
     r"MODULE \w+|ENDMODULE|PROC \w+\(\)|ENDPROC|!.*|PERS tooldata "
     r"(?P<tool>\w+):=\[TRUE,\[\[0,0,0\],\[1,0,0,0\]\],"
@@ -41,7 +41,7 @@ KRL = re.compile(
 
 @dataclass
 class ReadBack:
-    """Moves as times [s] and axes [rad] of their points; and what else happens, in order."""
+    """Moves as times [s] and axes [rad] of their points, and other events in order."""
 
     moves: list[tuple[list[float], list[Array]]]
     others: list[str]
@@ -108,7 +108,7 @@ def read_krl(file: WrittenFile) -> ReadBack:
 
 
 def stated(file: WrittenFile) -> float:
-    """The deviation [rad] that a file states for itself."""
+    """The deviation [rad] stated in a file."""
     found = re.search(r"within (\S+) rad", file.notes[0])
     assert found and found[0] in file.content.decode()
     return float(found[1])
@@ -133,7 +133,7 @@ def cut(t: Array, q: Array, at: Array) -> Array:
 def deviation(
     program: Program, back: ReadBack, other: Callable[[Array, Array, Array], Array]
 ) -> float:
-    """Of straight lines between the points, and of another course along them."""
+    """Deviation of straight lines between the points, and of another course along them."""
     worst = 0.0
     for move, (times, rows) in zip(program.moves, back.moves, strict=True):
         t, q = np.array(times), np.array(rows)

@@ -1,5 +1,4 @@
-"""A small interpreter of URScript: what the generated programs use of it, statement by
-statement."""
+"""A small interpreter of URScript, for the statements of the generated programs."""
 
 from __future__ import annotations
 
@@ -37,10 +36,10 @@ class Halt(Exception):
 
 
 class Controller:
-    """An arm that stands wherever servoj or movej last sent it, `lag` [rad] behind, with a
-    `payload` [kg] in force.
+    """An arm at the last target of servoj or movej, `lag` [rad] behind, with a `payload` [kg] in
+    force.
 
-    It records what it is told.
+    It records its commands.
     """
 
     def __init__(
@@ -57,7 +56,7 @@ class Controller:
         return np.array([[event[1], *event[2]] for event in self.events if event[0] == "servoj"])
 
     def run(self, text: str) -> None:
-        """Runs a program. Raises Halt, or SyntaxError for what is no URScript."""
+        """Runs a program. Raises Halt, or SyntaxError for text other than URScript."""
         scope: dict[str, Any] = {"Halt": Halt, "machine": self, "__builtins__": {"range": range}}
         scope |= {name: self._function(name) for name in SIGNATURES}
         exec(translated(text), scope)
