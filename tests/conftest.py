@@ -34,8 +34,9 @@ _count = itertools.count()
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """One more than there are cores: some tests wait for a service of their own to start or to
-    end."""
+    """One process more than cores: some tests wait for a service of their own to start or
+    to end.
+    """
     return len(os.sched_getaffinity(0)) + 1
 
 

@@ -64,9 +64,7 @@ class Truth:
 
 
 def truth_of(robot: Robot, seed: int = 0, payload: Payload | None = None) -> Truth:
-    """A unit of the robot with figures some ten per cent off the robot's own, and with load
-    friction.
-    """
+    """A unit of the robot with load friction and with figures some ten per cent off."""
     random = np.random.default_rng(seed)
     drives, law, nq = robot.drives, robot.friction, robot.nq
 
@@ -113,7 +111,7 @@ class Recording:
     payload: Payload
 
     def log(self, meaning: EffortMeaning = "current", name: str | None = None) -> Log:
-        """As the reader gives it, with the exact acceleration."""
+        """The log as its reader gives it, with the exact acceleration."""
         return Log(
             robot=self.robot.name,
             time=self.time,

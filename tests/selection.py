@@ -9,9 +9,7 @@ import pytest
 
 
 def long_but(quick: Collection[Any], values: Iterable[Any]) -> list[Any]:
-    """The values, or tuples of values, as parameters of a test: all but the `quick` ones are
-    `long`.
-    """
+    """The values, or tuples of values, as parameters of a test, `long` unless in `quick`."""
     found = list(values)
     assert all(each in found for each in quick), "a quick parameter is none of the test's"
     return [each if each in quick else _long(each) for each in found]

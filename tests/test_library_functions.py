@@ -48,7 +48,7 @@ def electrical(energy: joulepath.Energy) -> float:
 
 
 def test_optimize() -> None:
-    """The README's use: joints to joints, everything else left to its default."""
+    """The README's use: from joints to joints, with the defaults for everything else."""
     found = solution()
     assert isinstance(found, joulepath.Solution)
     assert found.certificate.valid
@@ -58,7 +58,7 @@ def test_optimize() -> None:
 
 
 def test_optimize_many() -> None:
-    """By an executor of the caller's; a problem without a solution does not end the others."""
+    """The caller brings the executor; a problem without a solution does not end the others."""
     far = joulepath.Pose.from_rotvec([3.0, 0.0, 0.0], [np.pi, 0.0, 0.0])
     with ThreadPoolExecutor(1) as executor:
         found = {
@@ -160,7 +160,7 @@ def test_inverse_kinematics() -> None:
 
 
 def test_what_is_too_late_says_so() -> None:
-    """The clock gains a second at every reading, so the deadline passes."""
+    """The clock gains a second at every reading, so the deadline passes in every function."""
     late = {"clock": CountingClock()}
     pose = joulepath.Pose.from_rotvec([0.5, 0.1, 0.4], [np.pi, 0.0, 0.0])
     with pytest.raises(joulepath.DeadlineExceeded):
@@ -181,8 +181,7 @@ def test_replay() -> None:
     run = found.under("feed_forward")
     assert electrical(run.energy) == pytest.approx(electrical(solution().energy), rel=5e-3)
     assert not run.collides
-    # solutions within the limits with the same duration, all of them in front of the straight
-    # motion
+    # baselines within the limits with the same duration, above all the straight motion
     names = {each.name for each in found.savings}
     assert {"ruckig_slowed", "straight"} <= names <= {each.name for each in solution().baselines}
     for each in found.savings:

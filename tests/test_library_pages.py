@@ -85,7 +85,7 @@ def test_the_exit_codes_of_the_page_are_those_of_the_help() -> None:
 
 
 def test_the_snippet_prints_what_the_readme_says() -> None:
-    """Its digits are few enough to be the same on every machine."""
+    """The printed digits are few enough to be the same on every machine."""
     snippets = re.findall(
         r"```python\n(.*?)```\n\nIt prints\n\n```\n(.*?)```",
         (ROOT / "README.md").read_text(),

@@ -230,7 +230,7 @@ def test_the_stub_lists_each_name_once() -> None:
 
 @pytest.mark.parametrize("name", sorted(FUNCTIONS | ERRORS | TYPES | SERVICE))
 def test_every_name_is_documented(name: str) -> None:
-    """A dataclass without a docstring has its signature as one."""
+    """A dataclass without a docstring has its signature for one, which does not count."""
     text = getattr(joulepath, name).__doc__
     assert text and not text.startswith(f"{name}(")
 
@@ -376,7 +376,7 @@ print(of_the_library, {"fastapi", "sqlalchemy", "starlette"} & sys.modules.keys(
 
 
 def test_it_works_beside_packages_of_the_same_names(tmp_path: Path) -> None:
-    """A folder may have its own `models` and `app`, and modules with the names of ours."""
+    """A user's folder may have its own `models` and `app`, and modules named like ours."""
     for package in ("app", "models", "optimizer"):
         (tmp_path / package).mkdir()
         (tmp_path / package / "__init__.py").write_text("MINE = True\n", encoding="utf-8")

@@ -52,7 +52,7 @@ def contents(package: str) -> set[str]:
 
 @pytest.mark.parametrize("room", rooms(), ids=name)
 def test_a_room_says_in_one_line_what_it_is_for(room: Path) -> None:
-    """A package's own first line counts; the public packages may say more below it."""
+    """The first line of a package counts; the public packages may say more below it."""
     init = room / "__init__.py"
     assert init.exists(), f"{name(room)} has no __init__.py"
     docstring = ast.get_docstring(ast.parse(init.read_text()))

@@ -40,9 +40,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The `bin` of an empty environment with the wheel; its dependencies come from this
-    interpreter.
-    """
+    """The `bin` of an empty environment with the wheel and the dependencies of this interpreter."""
     folder = tmp_path_factory.mktemp("installed") / "venv"
     venv.create(folder)
     python = folder / "bin" / "python"
@@ -89,8 +87,11 @@ def clean(variables: os._Environ[str] | dict[str, str]) -> dict[str, str]:
 
 
 def test_the_wheel_holds_all_that_runs(wheel: Path) -> None:
-    """Every tracked file of the three packages, the C library, the libraries of the page, the pages
-    of the documentation, the examples, and nothing else beside the metadata."""
+    """The wheel holds every tracked file of the three packages and the built files.
+
+    Built files are the C library, the libraries of the page, the pages of the documentation and the
+    examples. Nothing else is in it beside the metadata.
+    """
     tracked = subprocess.run(
         [
             "git",

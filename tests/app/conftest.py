@@ -42,8 +42,10 @@ def server() -> Iterator[Server]:
 
 @pytest.fixture(scope="session")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
-    """The service in this process, with recorded results instead of searches. Its database is its
-    own, since services with the same one share their jobs."""
+    """The service in this process, with recorded results instead of searches.
+
+    It has a database of its own, because services on one database share their jobs.
+    """
     database = f"sqlite:///{tmp_path_factory.mktemp('recorded')}/joulepath.db"
     with recorded_service(database_url=database) as client:
         yield client

@@ -142,7 +142,7 @@ def start_origin() -> None:
         listening.bind(f"\0{address}")
         listening.listen()
         command = [sys.executable, "-m", "tests.app.forks"]
-        # as workers have it
+        # workers also use one thread
         one_thread = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
         process = subprocess.Popen(command, cwd=ROOT, stdin=listening.fileno(), env=one_thread)
     os.environ[ORIGIN] = address

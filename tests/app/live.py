@@ -148,11 +148,11 @@ class Server:
             time.sleep(0.02)
 
     def wait_listening(self) -> None:
-        """Until it answers, workers warm or not."""
+        """Waits until the service answers, with warm workers or not."""
         self._wait_for("/healthz", "the server does not listen")
 
     def wait_ready(self) -> None:
-        """Until all workers are warm."""
+        """Waits until all workers are warm."""
         self._wait_for("/readyz", "the workers do not warm up")
 
     def _wait_for(self, path: str, failure: str) -> None:

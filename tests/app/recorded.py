@@ -106,7 +106,7 @@ def _instead_of(
     def instead(task: Any, deadline: float) -> TaskResult:
         if not _is_recorded.get():
             return run(task, deadline)
-        # as a process receives it: a large body is pickled until then
+        # as a process receives it: a large body stays pickled until then
         asked = sent(pickle.loads(pickle.dumps(task.request)))
         return replace(recorded(kind, task.request_id), asked=asked)
 
@@ -122,7 +122,7 @@ class RecordedWorker:
         self.ended = asyncio.Event()
 
     async def start(self) -> None:
-        """It is warm at once."""
+        """Starts the worker, which is warm at once."""
 
     def when_free(self, call: Callable[[], object]) -> None:
         call()
@@ -143,7 +143,7 @@ class RecordedWorker:
             turn(last, ended, work)
 
     def stop(self) -> None:
-        """Its tasks end by themselves."""
+        """Does nothing: the tasks end by themselves."""
 
     def kill(self) -> None:
         self.ended.set()
@@ -168,7 +168,7 @@ def recorded_workers() -> Iterator[None]:
 
 
 def _use_recordings() -> None:
-    """Gives the tasks their recordings, for recorded workers only: jobs make tasks of their own."""
+    """Gives recordings to tasks of recorded workers alone, because jobs make tasks of their own."""
     for kind, task in TASKS.items():
         searching: Any = type(task)
         searching.run = _instead_of(kind, searching.run)
@@ -195,7 +195,7 @@ def recorded_service(**settings: Any) -> Iterator[TestClient]:
 
 
 def main() -> None:
-    """Serves, or records."""
+    """Serves, or writes the recordings."""
     if sys.argv[1:] == ["record"]:
         FOLDER.mkdir(exist_ok=True)
         for kind in TASKS:

@@ -39,7 +39,7 @@ def test_it_optimizes_as_the_service_does(service: joulepath.Client) -> None:
 
 
 def test_it_has_the_functions_of_the_library(service: joulepath.Client) -> None:
-    """By the same names; many problems are a job, and shapes are data."""
+    """The functions have the same names; many problems are a job, and shapes are data."""
     own = {"optimize_many", "capsule_between", "even_payload"}
     public = {name: getattr(joulepath, name) for name in joulepath.__all__}
     functions = {name for name in public if name.islower()} - own
@@ -124,9 +124,7 @@ def test_a_job_from_begin_to_end(service: joulepath.Client) -> None:
 
 
 def test_a_wait_outlasts_a_restart_of_the_service() -> None:
-    """The wait ends with an error if the service never answers or stays away, or the job is
-    deleted.
-    """
+    """The wait fails if the service never answers or stays away, or the job is deleted."""
     stopping = problem_of(ShuttingDown(), "7")
     going = httpx2.Response(200, json={"state": "running"})
     away: list[httpx2.Response | Exception]
@@ -169,9 +167,7 @@ def test_another_server_is_no_service(content: bytes) -> None:
 
 @pytest.mark.parametrize("content", [b"<html>Log in</html>", b"[]", b""])
 def test_another_server_that_answers_is_no_service(content: bytes) -> None:
-    """The client refuses a proxy's page and a redirection, and does not send the key to the new
-    address.
-    """
+    """A proxy's page is refused, and so is a redirection: the key is not sent along."""
     other = answering(200, content)
     with pytest.raises(joulepath.ServiceUnreachable, match="another program"):
         other.optimize(move())

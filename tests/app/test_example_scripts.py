@@ -68,7 +68,7 @@ def test_program_draws_a_picture(name: str, server: Server, tmp_path: Path) -> N
 
 
 def test_only_programs_without_imports_from_the_repository_are_run_as_files() -> None:
-    """Run as a file, a program finds no room of the repository: the command must be `python -m
+    """A program run as a file finds no room of the repository and needs `python -m
     examples.NAME`.
     """
     pages = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md", *EXAMPLES.glob("*.py")]

@@ -125,7 +125,7 @@ def test_what_is_killed_loses_and_doubles_nothing(tmp_path: Path) -> None:
         until(lambda: processor_time(worker) > used + AT_WORK)
         services[0].post(f"{path}/cancel", None)
         assert ended(over(services[0]), path)["state"] == "cancelled"
-        # the search would take longer than anybody waits here
+        # The search would outlast the patience of this test.
         path = sent(over(services[0]), [evaluation()])
         assert ended(over(services[0]), path)["counts"]["done"] == 1
         assert computing(logs[1]) == [worker], "it has ended the search by itself"

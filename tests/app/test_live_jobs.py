@@ -40,7 +40,7 @@ def mixture(count: int) -> list[dict[str, Any]]:
 
 
 def check_each_once(lines: list[dict[str, Any]], job: dict[str, Any], requests: list[Any]) -> None:
-    """Every request has its own answer, and none has two."""
+    """Every request has exactly one answer, its own."""
     assert [line["index"] for line in lines] == list(range(len(requests)))
     assert [line["state"] for line in lines] == ["done"] * len(requests), job["counts"]
     assert len({line["answer"] for line in lines}) == len(requests)
@@ -58,8 +58,9 @@ def check_each_once(lines: list[dict[str, Any]], job: dict[str, Any], requests: 
     ids=["short", "long"],
 )
 def test_a_killed_service_loses_and_doubles_nothing(kills: int, count: int, tmp_path: Path) -> None:
-    """The client knows the number of its last complete event, and neither answers nor events
-    repeat.
+    """No answer and no event is lost or repeated after the kills of the service.
+
+    The client resumes from the number of its last complete event.
     """
     requests = mixture(count)
     service = KilledService(tmp_path, seed=kills, workers=1, deadline_grace=GRACE)
@@ -71,7 +72,7 @@ def test_a_killed_service_loses_and_doubles_nothing(kills: int, count: int, tmp_
 
 
 def check_events(found: list[Event], count: int) -> None:
-    """None is lost, and none comes twice."""
+    """No event is lost or repeated."""
     assert [event.number for event in found] == list(range(1, len(found) + 1))
     assert sorted(event.data["index"] for event in found if event.name == "request") == list(
         range(count)

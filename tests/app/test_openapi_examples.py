@@ -48,7 +48,7 @@ class Operation:
                 yield media_type, name, example
 
     def check(self, answer: Any) -> None:
-        """The status must be documented and, of a JSON answer, the schema, too."""
+        """The status is documented, and a JSON answer fits its schema."""
         documented = self.content["responses"][str(answer.status_code)]
         if answer.status_code != 204 and answer.headers.get("content-type") == "application/json":
             schema = documented["content"]["application/json"]["schema"]

@@ -25,7 +25,7 @@ SCHEMAS: dict[str, type[BaseModel]] = {
 
 
 def shape(value: Any) -> Any:
-    """A document without its values: names of fields, and types. Lists have the shapes of their
+    """A document without its values: names of fields, and types; lists have the shapes of
     entries.
     """
     if isinstance(value, dict):
@@ -50,7 +50,7 @@ def test_recordings_keep_to_the_schemas(kind: str) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("kind", TASKS)
 def test_recordings_have_the_shape_of_new_ones(kind: str) -> None:
-    """Otherwise: `python -m tests.app.recorded record`."""
+    """If they differ: `python -m tests.app.recorded record`."""
     assert shape(orjson.loads((FOLDER / f"{kind}.json").read_bytes())) == shape(record(kind))
 
 

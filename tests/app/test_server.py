@@ -88,7 +88,7 @@ def until_replaced(server: Server, before: list[int], count: int) -> None:
 
 
 def until_free(server: Server, before: list[int]) -> None:
-    """Until the workers have ended their tasks. They are the same as before."""
+    """Waits until the workers, the same as before, have ended their tasks."""
     until(server.is_idle)
     assert server.workers() == before
 
@@ -227,7 +227,7 @@ def test_garbage_on_the_socket_is_answered_with_a_problem(server: Server, garbag
 @pytest.mark.parametrize(
     ("settings", "deadline", "count", "statuses"),
     [
-        # done in its own time: a busy machine may find no motion in it
+        # The request ends in its own time: a busy machine may find no motion in it.
         pytest.param(
             {"shutdown_grace": LONG, "deadline_grace": GRACE},
             1.0,
@@ -282,7 +282,7 @@ def test_ctrl_c_in_a_terminal_ends_cleanly() -> None:
         # a terminal signals the whole foreground group
         for pid in (*everyone, server.process.pid):
             os.kill(pid, signal.SIGINT)
-        # done in its own time: a busy machine may find no motion in it
+        # The request ends in its own time: a busy machine may find no motion in it.
         assert future.result().status_code in (200, 504)
         assert server.process.wait(EXIT) == 0
         until(lambda: not any(alive(pid) for pid in everyone))
@@ -291,7 +291,7 @@ def test_ctrl_c_in_a_terminal_ends_cleanly() -> None:
 
 @pytest.mark.long
 def test_another_ctrl_c_ends_what_runs() -> None:
-    """The end of the lifespan is left out then, and the workers end by themselves."""
+    """A second Ctrl+C leaves out the end of the lifespan, and the workers end by themselves."""
     with serving(workers=1) as server, ThreadPoolExecutor() as pool:
         everyone = server.descendants()
         start_work(server, lambda: in_background(pool, server, long_search(LONG)), workers=1)

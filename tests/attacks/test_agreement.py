@@ -25,7 +25,7 @@ Json = dict[str, Any]
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # relative: largest difference between solves of the same motion
 AGREED = 1e-3
-# s: nothing here is to end by the deadline on a loaded machine
+# s: out of reach on a loaded machine
 DEADLINE = 120.0
 
 ISOLATED: Json = {
@@ -62,8 +62,8 @@ def test_on_an_isolated_bus_no_fixed_duration_needs_less_than_a_free_one() -> No
 
 @pytest.mark.parametrize("index", long_but([95], [5, 13, 21, 64, 95]))
 def test_its_own_duration_as_a_fixed_one_gives_the_same_energy(index: int) -> None:
-    """Moves with tight limits, with a payload, without either, the fastest motion, and one beside a
-    saddle.
+    """The moves have tight limits, a payload, neither, the shortest time, or a saddle
+    beside them.
     """
     _, body = request(0, index)
     free = solved(body)

@@ -32,7 +32,7 @@ def stretched(robot: str, seed: int) -> tuple[Array, Array, Array]:
     q[elbow] = 0.0
     T, jacobian = (each[0] for each in Chain.of(arm.model).flange_and_jacobian(q[None]))
     out = np.linalg.svd(jacobian)[0][:, 5]
-    # a shift moves the wrist out of reach as far as the lost direction has of a translation
+    # The shift follows the translation of the lost direction, away from the base.
     outward = out[:3] * (1 if out[:3] @ T[:3, 3] > 0 else -1)
     return q, T, outward / np.linalg.norm(outward)
 
@@ -75,9 +75,7 @@ def test_a_pose_that_is_clearly_out_of_reach_is_refused() -> None:
 
 
 def test_the_motion_to_a_stretched_pose_is_the_same_a_nanometre_out_of_reach() -> None:
-    """Without a tolerance, the branch was lost, and the answer went to another one for twice the
-    energy.
-    """
+    """Without a tolerance, the solver lost the branch and took another one of twice the energy."""
     q, T, outward = stretched("ur5e", 1)
     start = q + np.array([0.4, 0.3, 0.5, -0.3, 0.2, 0.4])
     energies = []

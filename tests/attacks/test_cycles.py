@@ -45,7 +45,7 @@ from tests.selection import long_but
 ENTRY = import_module("joulepath.optimizer.plan_cycle")
 # relative: sums of the same energies in another order
 ROUNDING = 1e-9
-# relative: an optimum found from another guess
+# relative: an optimum from another initial guess
 CONVERGED = 2e-3
 START = np.array([-1.477, -1.808, 1.483, 1.913, 0.829, -1.357])
 GOAL = np.array([-0.341, -2.823, 1.001, 1.472, 0.493, -2.509])
@@ -194,7 +194,7 @@ def test_cycles_need_no_more_than_any_simpler_one_at_any_time(seed: int) -> None
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(10))
 def test_more_time_does_no_more_mechanical_work(seed: int) -> None:
-    """Rests do no work: a cycle may wait."""
+    """A longer cycle may wait, and rests do no work."""
     asked = replace(
         near_cycles(seed), objective="mechanical", duration_max=0.2 + near_cycles(seed).dwell_time
     )
@@ -220,9 +220,7 @@ def test_more_time_does_no_more_mechanical_work(seed: int) -> None:
 
 @pytest.mark.long
 def test_simple_cycles_that_are_not_confirmed_are_no_answer() -> None:
-    """Sped up by half, the moves in their own time break limits; as they are, with a wait, they do
-    not.
-    """
+    """Moves sped up by half break limits; in their own time, followed by a wait, they do not."""
     for duration, confirmed in ((free().duration / 1.5, False), (free().duration * 1.5, True)):
         search = CycleSearch(in_time(HARD, duration), CountingClock(0.0))
         nodes = search.run()

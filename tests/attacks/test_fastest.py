@@ -54,9 +54,7 @@ def named(error: DurationTooShort) -> float:
 def assert_answered(
     asked: Problem, error: DurationTooShort, shares: tuple[float, ...] = (1.0, 1.02)
 ) -> None:
-    """The duration named by a refusal is attainable: fixed, as the longest one, and a little
-    longer.
-    """
+    """The named duration is attainable: fixed, as the longest one, and a little longer."""
     assert error.shortest is not None
     for share in shares:
         answer = optimize(replace(asked, **fixed(share * error.shortest)))
@@ -75,15 +73,16 @@ def test_one_bad_local_optimum_is_not_the_shortest_duration() -> None:
     # A motion at the proven bound is answered, too: Ruckig's takes no more time than the bound.
     exact = optimize(replace(asked, **fixed(error.bound * (1 + 1e-6))))
     assert exact.certificate.valid
-    # it stands as it was found, and is not sold as the optimum
+    # The motion stays as found, and is not called optimal.
     assert exact.status == "feasible"
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("index", long_but([5], range(16)))
 def test_no_motion_in_hand_is_faster(index: int) -> None:
-    """Moves of ±1.5 rad, every other one with 4 kg: of 118 alike, 16 were refused for up to ten
-    times too long.
+    """Moves of ±1.5 rad, every other one with 4 kg.
+
+    Of 118 such moves, 16 were refused with durations of up to ten times the shortest.
     """
     rng = np.random.default_rng([11, index])
     start, goal = rng.uniform(-1.5, 1.5, (2, 6))
@@ -138,7 +137,9 @@ def test_equal_ends_take_the_least_duration() -> None:
 
 @pytest.mark.long
 def test_phases_of_milliseconds_in_minutes() -> None:
-    """Joint 4 at 1 mrad/s: jerk lasts 4 ms of 300 s. No spline of few knots has such phases."""
+    """With joint 4 at 1 mrad/s, phases of jerk last 4 ms of 300 s, too short for a
+    spline's knots.
+    """
     v_max = ROBOT.limits.v_max.copy()
     v_max[3] = 1e-3
     asked = problem(limits=replace(ROBOT.limits, v_max=v_max))
@@ -151,7 +152,7 @@ def test_phases_of_milliseconds_in_minutes() -> None:
 def test_without_a_limit_on_jerk() -> None:
     """Without a limit on jerk, acceleration may jump, unlike any spline's.
 
-    The spline takes at most 3 ms more than the joints need.
+    The motion takes at most 3 ms more than the proven bound.
     """
     robot = replace(ROBOT, limits=replace(ROBOT.limits, j_max=np.full(6, np.inf)))
     asked = problem(robot=robot, payload=Payload(4.5, np.array([0.05, 0.05, 0.12])))
@@ -225,7 +226,7 @@ def test_a_search_that_is_cut_short_says_so(tick: float) -> None:
         optimize(replace(tight, deadline=2.0), clock=CountingClock(tick))
     error = caught.value
     assert not error.proven and ("deadline" in str(error)) == error.cut_short
-    # at such a pace no start comes to its end in time
+    # At such a pace, no start ends in time.
     assert error.cut_short or tick < 0.02
     if error.shortest is None:
         assert error.cut_short and error.bound > TOO_SHORT

@@ -316,13 +316,13 @@ def test_a_busy_port_is_told_with_its_remedy(tmp_path: Path, host: str) -> None:
     assert done.returncode == 1
     assert b"Address already in use" in done.stderr
     assert b"choose another port by --port" in done.stderr
-    # it has not begun anything: no log, no database
+    # The service has begun nothing: no log, no database.
     assert len(done.stderr.splitlines()) == 1 and not list(tmp_path.iterdir())
 
 
 @pytest.mark.long
 def test_a_request_under_a_locale_without_unicode(tmp_path: Path) -> None:
-    """`LC_ALL=C PYTHONUTF8=0`: Python reads files without a named encoding as ASCII."""
+    """With `LC_ALL=C PYTHONUTF8=0`, Python reads files without a named encoding as ASCII."""
     code = (
         "from tests.optimizer.moves import problem; from joulepath import optimize\n"
         "print(optimize(problem()).certificate.valid)\n"

@@ -54,8 +54,8 @@ def test_a_gripper_without_a_shape_is_said_to_be_in_the_table(client: TestClient
 
 
 def test_the_remedy_of_the_warning_works(client: TestClient) -> None:
-    """With shapes, the goal in the table is refused; above it, the motion keeps clear and nothing
-    is said.
+    """With shapes, the goal in the table is refused; above it, the motion is clear without a
+    warning.
     """
     tool = {"capsules": [{"start": [0, 0, 0.06], "end": [0, 0, 0.13], "radius": 0.02}]}
     box = {"shape": "box", "size": [0.1, 0.1, 0.1], "pose": pose([0.0, 0.0, 0.15])}
@@ -88,8 +88,8 @@ def test_points_rows_and_recordings_say_it_too(client: TestClient) -> None:
 
 @pytest.mark.long
 def test_each_move_of_a_cycle_has_its_own_payload(client: TestClient) -> None:
-    """The tool's end stays above the table: only the part on its way from pick to place reaches
-    into it.
+    """The tool stays above the table; only the part, on its way from pick to place, reaches into
+    it.
     """
     target = {"pose": {"position": [0.7, -0.3, 0.02], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
     stops = [

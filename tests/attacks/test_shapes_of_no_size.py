@@ -66,7 +66,7 @@ def test_a_mesh_of_no_size_makes_no_robot(scale: str, points: Any, words: str) -
 
 
 def test_a_mirrored_mesh_and_a_flat_one_keep_their_size() -> None:
-    """A negative scale mirrors, as on left and right hands; a sheet of metal is a surface with an
+    """A negative scale mirrors, as for left and right hands; a sheet of metal is flat but has an
     area.
     """
     for scale, points in (("0.001 -0.001 0.001", BLOCK), ("0.001 0.001 0.001", BLOCK * [1, 1, 0])):

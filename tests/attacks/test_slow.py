@@ -31,7 +31,7 @@ RAMPS = 5e-3
 
 @pytest.fixture(scope="module", autouse=True)
 def _compiled() -> None:
-    """Many motions of the default robot take a while without it."""
+    """Compiles the kernel: many motions of the default robot are slow without it."""
     with with_compiler():
         compile_kernel(load_robot("ur5e"))
 
@@ -54,7 +54,7 @@ def shortest(task: Problem) -> float:
 
 @pytest.mark.parametrize("speed", long_but([0.3], LEAST_KNOWN))
 def test_a_slow_joint_ramps_as_fast_as_it_can(speed: float) -> None:
-    """Evenly spaced knots need 2 to 21 % more: their ramps take seconds."""
+    """Evenly spaced knots would need 2 to 21 % more energy, because their ramps take seconds."""
     found = optimize(slow(speed))
     assert energy(found) < LEAST_KNOWN[speed] * (1 + MOST_EXCESS)
     assert found.status == "optimal" and found.certificate.valid
@@ -67,7 +67,7 @@ def test_the_excess_of_slow_moves_is_small() -> None:
 
 @pytest.mark.parametrize("ratio", long_but([1.1], [1.0005, 1.003, 1.02, 1.1]))
 def test_a_duration_next_to_the_shortest_is_kept(ratio: float) -> None:
-    """Half a thousandth of 40 s is less than a ramp."""
+    """At 40 s, a margin of half a thousandth is shorter than a ramp."""
     task = slow(0.05)
     longest = ratio * shortest(task)
     found = optimize(replace(task, duration_max=longest))
@@ -104,8 +104,9 @@ def test_other_buses_ramp_as_fast(bus: Bus) -> None:
     ("index", "speed"), long_but([(2, 0.25)], [(2, 0.25), (4, 0.08), (5, 0.25)])
 )
 def test_a_slow_tcp_is_within_its_limit_in_short_spans(index: int, speed: float) -> None:
-    """Evenly spaced path points missed short knot spans: no motion was confirmed, or one of half
-    again the energy.
+    """Evenly spaced path points once missed short knot spans.
+
+    Then no motion was confirmed, or only one of half again the energy.
     """
     _, task = slow_problem(0, index)
     task = replace(task, arm=replace(task.arm, tcp_speed=speed))
@@ -124,7 +125,7 @@ PLACES = {
 }
 # relative: most that a displacement of 1e-7 rad may add to the energy_of_displacement at rest
 MORE = 2e-3
-# s: nothing here is to end by the deadline on a loaded machine
+# s: out of reach on a loaded machine
 DEADLINE = 60.0
 
 
@@ -161,8 +162,9 @@ def test_a_displacement_of_nothing_needs_what_standing_still_needs(
 def test_a_certified_motion_is_answered_where_better_ones_are_refused(
     robot: str, displacement: float
 ) -> None:
-    """The certificate refuses the best motion of the Panda and of the KR 10, and confirms the
-    fastest one, slowed down.
+    """The certificate refuses the best motion of the Panda and of the KR 10.
+
+    It confirms their fastest motion, slowed down.
     """
     still = energy_of_displacement(robot, 0.0, 1.0)
     assert energy_of_displacement(robot, displacement, 1.0) == pytest.approx(still, rel=MORE)

@@ -186,8 +186,10 @@ SOLIDS = b"solid\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendsolid\n" * 40_000
 
 @pytest.mark.parametrize(("kind", "content"), [("obj", GROUPS), ("stl", SOLIDS)])
 def test_groups_materials_and_solids_cost_nothing(kind: Any, content: bytes) -> None:
-    """All of their triangles count. It took time as the square of their number, minutes for
-    these."""
+    """The mesh has the triangles of all groups.
+
+    The time once grew as the square of their number, to minutes for these files.
+    """
     assert len(mesh(kind, content).corners) == 40_000
 
 
@@ -206,7 +208,10 @@ def test_a_glb_of_many_copies_is_refused(primitives: int, nodes: list[dict[str, 
 
 
 def test_corners_that_count_back_are_those_above_the_face() -> None:
-    """Of the whole file, the last three would be the second triangle's, twice."""
+    """A negative index counts back from its face.
+
+    Counted from the end of the file, both faces would have the corners of the second triangle.
+    """
     content = (
         b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 5\nv 1 0 5\nv 0 1 5\nf -3/1/1 -2//2 -1\n"
     )
@@ -337,7 +342,7 @@ def test_gzip_that_yields_nothing_ends_at_the_deadline(content: bytes) -> None:
     ],
 )
 def test_the_worker_answers_and_lives_on(client: TestClient, change: dict[str, Any]) -> None:
-    """The last but one has three corners only, in 40,000 groups."""
+    """The last mesh but one has three corners only, in 40,000 groups."""
     workers = sorted(client.app.state.engine.worker_pids)  # type: ignore[attr-defined]
     errors = refused(
         client.post("/robots", json={"name": "attack", **ARM, **change}), InvalidRequest
@@ -347,7 +352,7 @@ def test_the_worker_answers_and_lives_on(client: TestClient, change: dict[str, A
 
 
 def test_a_body_that_unpacks_to_more_than_the_limit_is_refused(client: TestClient) -> None:
-    """Before and after unpacking: 70 kB of gzip make 70 MB of JSON."""
+    """70 kB of gzip make 70 MB of JSON, which is refused packed or not."""
     content = b'{"urdf": "' + b" " * 70_000_000 + b'"}'
     headers = {"Content-Type": "application/json"}
     packed = client.post(

@@ -17,7 +17,7 @@ from tests.browsers import SOFTWARE, chromium
 
 @pytest.fixture(scope="session")
 def service() -> Iterator[Server]:
-    """With a database of its own."""
+    """A service with a database of its own."""
     with serving(workers=1, deadline_grace=GRACE) as server:
         yield server
 
@@ -30,7 +30,7 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="module")
 def page(browser: Browser, service: Server) -> Iterator[Page]:
-    """The page with its first example, still. Tests of a module share it."""
+    """The page at rest with its first example, shared by the tests of a module."""
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
         until(page, MESHES)

@@ -47,8 +47,9 @@ AXE = (ROOT / "app" / "studio" / "node_modules" / "axe-core" / "axe.min.js").rea
 
 
 def until(page: Page, condition: str, patience: float = ANSWER) -> None:
-    """Waits until a JavaScript function of the page returns true. The page's own policy forbids
-    `wait_for_function`.
+    """Waits until a JavaScript function of the page returns true.
+
+    The policy of the page forbids `wait_for_function`.
     """
     end = time.monotonic() + patience
     while not page.evaluate(condition):
@@ -62,7 +63,7 @@ def state(page: Page, what: str) -> Any:
 
 
 def tcp(page: Page, time: float) -> np.ndarray:
-    """The pose of the TCP (4, 4) as it is drawn at a time."""
+    """The pose of the drawn TCP (4, 4) at a time."""
     page.locator("#scrub").evaluate(
         "(it, time) => { it.value = time; it.dispatchEvent(new Event('input')); }", time
     )

@@ -42,7 +42,7 @@ BEST = """() => {
 }"""
 
 
-# how many shapes of payloads are drawn now
+# number of shapes of payloads in the picture
 CARRIED = """() => {
     let count = 0;
     for (const load of studio.view.arms[0].loads)
@@ -171,7 +171,7 @@ def test_a_goal_is_dragged_and_a_box_is_drawn(browser: Browser, service: Server)
 
 
 def test_progress_is_shown_and_cancelled(page: Page, service: Server) -> None:
-    """The search of minutes tells its best energy; after a cancel its worker is free."""
+    """A search of minutes shows its best energy so far, and a cancel frees its worker."""
     fill_json(page, long_search(100.0))
     page.locator("#optimise").click()
     expect(page.locator("#progress-text")).to_contain_text("Best so far")
@@ -237,7 +237,7 @@ def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:
 
 
 def test_a_page_stands_alone(browser: Browser, service: Server, tmp_path: Path) -> None:
-    """Opened from a file, with no service and no network."""
+    """The page is opened from a file, with no service and no network."""
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
         page.locator("#export").click()

@@ -77,9 +77,7 @@ def test_authorize(guarded: tuple[Server, str], page: Page) -> None:
 def test_an_operation_fits_a_screen_and_is_tried_out(
     guarded: tuple[Server, str], page: Page
 ) -> None:
-    """Every operation, as it is before one of its parts is opened; the page follows nothing but
-    this service.
-    """
+    """Every operation with closed parts fits a screen; the page asks this service alone."""
     server, secret = guarded
     faults: list[str] = []
     page.on("pageerror", lambda error: faults.append(str(error)))
@@ -117,8 +115,8 @@ def test_an_operation_fits_a_screen_and_is_tried_out(
 
 
 def test_a_page_of_another_site_reaches_nothing(guarded: tuple[Server, str], page: Page) -> None:
-    """A real browser on a page of another port: neither a form nor a script gets through, with the
-    key or without.
+    """From a page of another port, neither a form nor a script reaches the service, even with the
+    key.
     """
     server, secret = guarded
     before = len(server.logged())

@@ -34,7 +34,7 @@ def add_log(page: Page, file: Path) -> None:
 
 
 def last(service: Server) -> dict[str, Any]:
-    """The newest identification, as the service tells it."""
+    """The newest identification, as answered by the service."""
     id = service.get("/identifications").json()["identifications"][0]["id"]
     found = service.get(f"/identifications/{id}").json()
     return dict(found) | service.get(f"/identifications/{id}/residuals").json()
@@ -98,8 +98,7 @@ def test_a_log_becomes_figures_that_the_next_motion_has(
     assert not [found for found in page.evaluate(CONTRASTS) if found[1] < LEAST]
     page.get_by_role("button", name="Use these figures").click()
     assert state(page, "request.figures") == found["figures"] and not page.evaluate(OPENED)
-    # on a busy machine, the usual deadline may pass without an answer: these figures need a kernel
-    # of their own
+    # On a busy machine, the usual deadline may pass: these figures need a kernel of their own.
     ask(page, state(page, "request") | {"deadline": ANSWER})
     assert state(page, "answered.asked.figures") == found["figures"]
 

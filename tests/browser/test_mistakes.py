@@ -106,7 +106,7 @@ def test_numbers_that_are_none_are_refused_at_their_cells(page: Page) -> None:
 
 
 def test_prices_and_times_that_are_none_are_refused_where_they_stand(page: Page) -> None:
-    """The text stays, and the number of before counts until another one is given."""
+    """The typed text stays, and the previous number counts until the next valid one."""
     fill_json(page, FIRST)
     show_json(page, False)
     optimised(page)
@@ -138,9 +138,7 @@ def test_prices_and_times_that_are_none_are_refused_where_they_stand(page: Page)
 def test_what_the_service_cannot_tell_is_said_where_it_is_missing(
     browser: Browser, service: Server
 ) -> None:
-    """Without the figures of a gripper or the list of kept things, the page claims no
-    empty list.
-    """
+    """An error is shown for the gripper and for every list, instead of an empty list."""
     with opened(browser, f"{service.url}/studio", tolerated=OFFLINE) as page:
         until(page, SHOWN)
         page.locator("#tool-fold > summary").click()

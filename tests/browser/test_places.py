@@ -250,7 +250,7 @@ def cycle(body: Any) -> Cycle:
 
 
 def same(one: Cycle, other: Cycle) -> bool:
-    """Whether two cycles are seen alike from their bases."""
+    """Whether two cycles are equal as seen from their bases."""
     first, second = numbers(one), numbers(other)
     return len(first) == len(second) and bool(np.allclose(first, second, rtol=0, atol=ROUNDING))
 

@@ -146,7 +146,7 @@ def test_words_stay_in_the_picture(browser: Browser, service: Server) -> None:
     with opened(browser, f"{service.url}/studio", viewport={"width": 390, "height": 844}) as page:
         until(page, SHOWN)
         until(page, MESHES)
-        # once more drawn, after the picture was made anew
+        # drawn again, after the picture was made anew
         page.evaluate("() => studio.view.render()")
         label, box = (page.locator(name).bounding_box() for name in (".label.near", "#labels"))
         assert label and box

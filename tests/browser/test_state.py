@@ -34,7 +34,7 @@ pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
 
 def test_figures_older_than_the_cell_are_marked(page: Page) -> None:
-    """The old motion is not drawn; undo brings the answer back; a reload loses nothing."""
+    """The picture hides the old motion, undo brings the answer back, and a reload loses nothing."""
     fill_json(page, FIRST)
     show_json(page, False)
     optimised(page)
@@ -67,7 +67,7 @@ def test_figures_older_than_the_cell_are_marked(page: Page) -> None:
 def test_projects_are_named_saved_and_opened(
     browser: Browser, service: Server, tmp_path: Path
 ) -> None:
-    """In the browser, and as files."""
+    """Projects are saved in the browser, and as files."""
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
         page.get_by_label("Name of the project").fill("Night cell")
@@ -91,7 +91,9 @@ def test_projects_are_named_saved_and_opened(
 
 
 def test_a_kept_answer_comes_back_as_it_was_typed(browser: Browser, service: Server) -> None:
-    """In another browser, from the list of answers: poses as poses, and numbers digit by digit."""
+    """Another browser opens the answer from the list: poses as poses, and numbers digit
+    by digit.
+    """
     name = f"Night cell {uuid4().hex[:6]}"
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
@@ -113,7 +115,7 @@ def test_a_kept_answer_comes_back_as_it_was_typed(browser: Browser, service: Ser
 
 
 def test_what_is_typed_stays_while_poses_are_checked(page: Page) -> None:
-    """The answer of the service to one number comes while the next one is typed."""
+    """The service answers one number while the user types the next."""
     fill_json(page, FIRST)
     show_json(page, False)
     row = page.locator("[data-row='/goal']")
@@ -134,7 +136,7 @@ def test_what_is_typed_stays_while_poses_are_checked(page: Page) -> None:
 
 
 def test_a_gripper_by_name_is_seen_and_counts(page: Page) -> None:
-    """It brings its TCP, its shape and its mass, with the letters of their sources."""
+    """The gripper brings its TCP, shape and mass, with the letters of their sources."""
     fill_json(page, {"start": FIRST["start"], "goal": FIRST["goal"], "payload": FIRST["payload"]})
     show_json(page, False)
     page.locator("#tool-fold > summary").click()
@@ -156,7 +158,7 @@ def test_a_gripper_by_name_is_seen_and_counts(page: Page) -> None:
 
 
 def test_a_part_of_known_size_needs_no_inertia(page: Page) -> None:
-    """It is gripped at the TCP, and its program sets the part and the gripper as one payload."""
+    """The part is gripped at the TCP, and the program sets part and gripper as one payload."""
     fill_json(page, {"start": FIRST["start"], "goal": FIRST["goal"], "tool": "robotiq_2f_85"})
     show_json(page, False)
     expect(page.locator("[data-pointer='/tcp/position/2']")).to_have_value("142.0")

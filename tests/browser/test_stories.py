@@ -44,7 +44,7 @@ RADIANS = "pose in mm and RX RY RZ in rad"
 
 
 def paste(page: Page, text: str, reading: str = RADIANS) -> None:
-    """Enters a text into the paste box, and answers the question how it is meant."""
+    """Enters a text into the paste box and chooses its reading."""
     page.locator("#paste").fill(text)
     page.locator("#paste").press("Enter")
     page.locator("#readings").get_by_role("button", name=reading, exact=True).click()
@@ -60,7 +60,7 @@ def report(page: Page, kind: Literal["html", "pdf"]) -> bytes:
 
 
 def test_a_programmer_takes_a_program_to_the_controller(browser: Browser, service: Server) -> None:
-    """From an empty cell with two poses of the pendant, 4 kg and a table."""
+    """The cell starts empty and gets two poses of the pendant, 4 kg and a table."""
     with opened(browser, f"{service.url}/studio") as page:
         new_cell(page)
         expect(page.locator("#optimise")).to_be_disabled()
@@ -169,7 +169,9 @@ def test_a_programmer_makes_a_round_of_a_table(browser: Browser, service: Server
 
 
 def test_a_researcher_brings_an_own_arm(browser: Browser, service: Server, tmp_path: Path) -> None:
-    """From a URDF to a table of samples; targets by sliders and as the arm stands."""
+    """A URDF leads to a table of samples; targets come from sliders and from the pose of
+    the arm.
+    """
     urdf = tmp_path / "Two joints.urdf"
     urdf.write_text(ARM["urdf"])
     with opened(browser, f"{service.url}/studio") as page:
@@ -238,7 +240,7 @@ NAMES = ["bin to shelf", "shelf to bin", "bin to far"]
 def test_an_engineer_takes_a_table_of_moves_overnight(
     browser: Browser, service: Server, tmp_path: Path
 ) -> None:
-    """A job from a CSV file, in the cell as it is; its totals and its CSV."""
+    """The job has moves from a CSV file, in the current cell; it ends with totals and a CSV."""
     start, goal = "-420;280;300;0;3.142;0", "-350;-420;350;1.571;0;0"
     table = tmp_path / "line 2.csv"
     head = "from;to;kg;x mm;y;z;rx rad;ry;rz;x;y;z;rx;ry;rz"
@@ -279,7 +281,7 @@ def test_an_engineer_takes_a_table_of_moves_overnight(
         page.locator("#moves tbody tr.failed").get_by_role("button", name="Open in cell").click()
         until(page, "() => studio.state.page === 'cell' && Boolean(studio.state.trouble)")
         expect(page.locator("[data-row='/goal']")).to_contain_text("out of reach")
-    # whoever looks at it elsewhere sees the names, and the moves as they were asked for
+    # A viewer elsewhere sees the names and the requested moves.
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
         go(page, "Jobs")
@@ -292,7 +294,7 @@ def test_an_engineer_takes_a_table_of_moves_overnight(
 
 
 def test_an_engineer_reports_to_those_who_decide(page: Page) -> None:
-    """With the costs as they were set, as a page and as PDF."""
+    """The report has the costs of the user, as a page and as PDF."""
     fill_json(page, FIRST)
     show_json(page, False)
     optimised(page)

@@ -40,7 +40,7 @@ LOADED = """() => ["navigation", "resource"]
 
 
 def test_the_first_look_moves(browser: Browser, service: Server) -> None:
-    """From `/`, without a click: an example is computed, drawn and played."""
+    """The page at `/` computes, draws and plays an example without a click."""
     with opened(browser, f"{service.url}/", reduced_motion="no-preference") as page:
         until(page, SHOWN)
         assert page.url == f"{service.url}/studio"
@@ -55,7 +55,7 @@ def test_the_first_look_moves(browser: Browser, service: Server) -> None:
 
 
 def test_one_clock(page: Page) -> None:
-    """A click on a plot, a key and a limit set the time of everything."""
+    """A click on a plot, a key and a limit set the time of all views."""
     plot = page.locator("#plot-power .u-over")
     box = plot.bounding_box()
     assert box is not None
@@ -150,7 +150,7 @@ def test_a_link_holds_the_request(browser: Browser, page: Page) -> None:
 
 
 def test_a_broken_link_says_so(browser: Browser, page: Page) -> None:
-    """The example is shown instead. Another link in the same tab is opened."""
+    """A broken link shows the example; another link in the same tab is opened."""
     page.locator("#share").click()
     until(page, "() => location.hash.startsWith('#r=')")
     link = page.url
@@ -277,7 +277,7 @@ def test_the_keyboard_is_enough(browser: Browser, service: Server) -> None:
 
 
 def test_a_point_of_the_front_takes_the_place_of_the_answer(page: Page) -> None:
-    """The last test of the shared page: it shows another request."""
+    """This test of the shared page comes last, because it shows another request."""
     lift = json.loads((ROOT / "examples" / "pareto" / "lift.json").read_text())
     ask(page, {name: value for name, value in lift.items() if name not in ("points", "duration")})
     page.get_by_role("tab", name="Energy over time").click()

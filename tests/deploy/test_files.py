@@ -99,14 +99,14 @@ def test_compose_is_not_open(compose: dict[str, Any]) -> None:
         assert ("ports" in service) == (name == "proxy"), "only the proxy is reached from outside"
         if name.startswith("joulepath"):
             assert service["environment"]["JOULEPATH_API_KEYS_FILE"].startswith("/etc/joulepath/")
-            # a mount of the file alone would keep the old one when it is replaced
+            # With a mount of the file alone, a replacement of the file would have no effect.
             assert "./keys:/etc/joulepath:ro" in service["volumes"]
             subnet = compose["networks"]["front"]["ipam"]["config"][0]["subnet"]
             assert service["environment"]["JOULEPATH_TRUSTED_PROXIES"] == subnet
 
 
 def test_compose_keeps_the_cluster_apart(compose: dict[str, Any]) -> None:
-    """Whoever reaches it can run any code there."""
+    """A client of the cluster can run any code there."""
     assert compose["networks"]["cluster"] == {"internal": True}
     members = {
         name: each
@@ -156,7 +156,7 @@ def test_the_image_is_made_of_what_its_context_has(compose: dict[str, Any]) -> N
 
 @pytest.mark.long
 def test_every_module_can_be_imported() -> None:
-    """As the image does when it is built."""
+    """The image imports every module at its build, too."""
     command = [sys.executable, ROOT / "scripts" / "import_all.py"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

@@ -74,9 +74,7 @@ def certificate(folder: Path) -> None:
 
 
 def configuration(folder: Path, port: int, services: list[str]) -> Path:
-    """The files of `deploy/nginx` with other ports, addresses and paths, in a main file as Debian
-    has it.
-    """
+    """The files of `deploy/nginx` with other ports, addresses and paths, in Debian's main file."""
     site = (ROOT / "deploy" / "nginx" / "joulepath.conf").read_text()
     site = re.sub(r"^ *listen \[::\].*\n", "", site, flags=re.M)
     site = site.replace("listen 80;", f"listen 127.0.0.1:{free_port()};")
@@ -101,9 +99,7 @@ def configuration(folder: Path, port: int, services: list[str]) -> Path:
 
 @contextmanager
 def nginx(folder: Path, services: list[str]) -> Iterator[tuple[str, httpx2.Client]]:
-    """nginx with the certificate in `folder`, in front of two services: its URL and a trusting
-    client.
-    """
+    """nginx with the certificate in `folder`, in front of two services: URL and trusting client."""
     port = free_port()
     main = configuration(folder, port, services)
     subprocess.run(["nginx", "-t", "-c", main], check=True, capture_output=True)
@@ -202,7 +198,7 @@ def test_measurements_are_not_public(whole: Whole, key: dict[str, str]) -> None:
 
 @pytest.mark.parametrize(("path", "says_so"), [("/jobs/1/events", False), ("/optimize", True)])
 def test_events_come_one_by_one(path: str, says_so: bool, tmp_path: Path) -> None:
-    """The second event is sent only when the first was received."""
+    """The second event is sent only after the first has arrived."""
     received = threading.Event()
 
     class Events(BaseHTTPRequestHandler):

@@ -90,10 +90,10 @@ def given_file(page: Path, name: str) -> str | None:
 
 @by_page(argvalues=pages_with("joulepath"))
 def test_the_command_line_accepts_the_commands(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With their options; the service accepts the requests of their files."""
+    """The command line takes the arguments, and the service accepts the requests in their files."""
     called: list[click.Context] = []
     monkeypatch.setattr(click.Command, "invoke", lambda self, context: called.append(context))
-    # of files, the page has some, and earlier commands write the others
+    # some files are on the page, earlier commands write the others
     monkeypatch.setattr(click.Path, "convert", lambda self, value, param, context: value)
     for arguments in commands_of(page, "joulepath"):
         joulepath.main(arguments, prog_name="joulepath", standalone_mode=False)

@@ -57,7 +57,9 @@ def test_arguments_are_refused_and_not_ignored() -> None:
 
 @pytest.mark.parametrize("code", [0, 3])
 def test_the_exit_code_of_the_server_is_kept(code: int) -> None:
-    """Also by `joulepath serve`. Only an end without an error skips the end of the interpreter."""
+    """`joulepath serve` keeps the exit code, too; only an end without an error skips Python's own
+    end.
+    """
     program = (
         "import sys, joulepath.app.server as server; "
         f"server.serve = lambda settings: sys.exit({code}); sys.argv = ['joulepath', 'serve']; "

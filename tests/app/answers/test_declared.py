@@ -60,7 +60,7 @@ class First:
 
 @dataclass(frozen=True, kw_only=True)
 class Whole(First):
-    """Everything at once."""
+    """A class with all kinds of fields."""
 
     q: Annotated[PerJoint, Unit("rad")] | None
     """Joint positions."""
@@ -155,7 +155,7 @@ def test_a_field_without_a_text_is_refused() -> None:
 
 
 def test_what_the_library_keeps_to_itself() -> None:
-    """A new field of the library is public unless it is internal."""
+    """The internal fields are listed here, so a new field of the library is public by default."""
     kept: dict[type[Any], set[str]] = {
         Certificate: {"rest_error", "pass_error", "close_pass"},
         Baseline: {"sensitivity", "at_goal"},
@@ -170,7 +170,7 @@ def test_the_text_of_warnings_names_the_distance() -> None:
 
 
 def test_only_one_module_reads_the_markers() -> None:
-    """Elsewhere they are written into types."""
+    """Other modules only write the markers into types."""
     readers = {
         path.relative_to(ROOT).as_posix()
         for package in ("app", "optimizer")

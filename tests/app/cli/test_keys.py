@@ -58,7 +58,7 @@ def test_what_is_refused(arguments: tuple[str, ...], word: str, here: Here, tmp_
 
 
 def test_where_the_package_is_not_installed(tmp_path: Path) -> None:
-    """As in the image and in `deploy/compose.yaml`."""
+    """The command runs from the sources, as in the image and in `deploy/compose.yaml`."""
     command = [
         sys.executable,
         "-m",

@@ -32,7 +32,7 @@ def written(here: Here, tmp_path: Path, *arguments: str, stdin: str = "") -> Any
 
 
 def test_a_first_move_needs_no_file(here: Here, tmp_path: Path) -> None:
-    """Joints in radians and in degrees, and a pose of URScript."""
+    """The options take joints in radians or degrees, and a pose of URScript."""
     answer = written(here, tmp_path, "optimize", "--robot", "ur5e", "--from", FROM, "--to", TO)
     model_of(OptimizeAnswer).model_validate_json(json.dumps(answer))
     assert answer["trajectory"]["q"][0] == pytest.approx(HOME)
@@ -111,7 +111,7 @@ def test_a_placement_with_its_cycles(here: Here, tmp_path: Path) -> None:
     kept = json.loads((folder / f"{Path(own['answer']).name}.json").read_text())
     total = kept["energy"]["electrical"]["total"]
     assert total == pytest.approx(answer["best"]["energy"])
-    # joint positions stay the same wherever the base stands
+    # joint positions do not depend on the place of the base
     assert answer["saving"] == pytest.approx(0.0, abs=1e-6)
     lines = searches.placement_summary(answer)
     assert lines["energy"] == f"{answer['best']['energy']:.4g} J electrical"

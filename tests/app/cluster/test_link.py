@@ -231,7 +231,7 @@ def scheduler_process(
 ) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
     """A scheduler in its own process, and its address.
 
-    It imports the package from `folder`, or has none if the folder has none.
+    The scheduler has the version of the package in `folder`, or no package if the folder has none.
     """
     if not (folder / "joulepath").exists() and "PYTHONPATH" not in environment:
         # hides the installed package
@@ -332,7 +332,7 @@ async def test_a_machine_of_another_version_gets_nothing(
 async def test_a_scheduler_that_hangs_and_goes_on(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Its connections stay open, and say nothing."""
+    """The connections of the stopped scheduler stay open without any messages."""
     monkeypatch.setattr(link, "LINK", replace(link.LINK, patience=1.0))
     monkeypatch.setenv("JOULEPATH_ROBOTS", "")
     with scheduler_process(tmp_path, PYTHONPATH=str(ROOT)) as (process, address):

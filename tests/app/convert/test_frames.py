@@ -35,9 +35,7 @@ def third_party() -> str:
 
 
 def in_ros(position: list[float]) -> dict[str, Any]:
-    """A pose in `base_link` with the TCP at `position` of `base`, turned by QUATERNION in
-    `base_link`.
-    """
+    """A pose in `base_link` with its TCP at `position` of `base`, turned by QUATERNION."""
     x, y, z = position
     turned = pin.Quaternion(np.array(QUATERNION)).matrix()
     back = pin.Quaternion(HALF_TURN[:3, :3] @ turned)

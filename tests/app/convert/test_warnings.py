@@ -15,7 +15,7 @@ from joulepath.app.schemas.request import OptimizeRequest
 
 
 def solution(complete: bool, names: list[str]) -> Any:
-    """As much of a solution as the warnings read."""
+    """The parts of a solution read by the warnings."""
     baselines = [SimpleNamespace(name=name) for name in names]
     certificate = SimpleNamespace(close_pass=None)
     return SimpleNamespace(

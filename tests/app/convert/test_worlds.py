@@ -73,9 +73,7 @@ def test_voxels_by_cells_and_by_bits_are_the_same() -> None:
 
 @pytest.mark.parametrize("format_", ["stl", "obj", "glb"])
 def test_a_mesh_file_keeps_every_triangle(format_: Any) -> None:
-    """All triangles of the file are kept, at the requested scale, and the result is closed as the
-    mesh.
-    """
+    """The mesh keeps all triangles of the file, at the requested scale, and stays closed."""
     found = mesh_from_file(format_, base64_of(torus().export(file_type=format_)), 0.5)
     assert found.is_closed and found.corners.shape == (256, 3, 3)
     ours, theirs = in_order(found.corners * 2), in_order(torus().triangles)
@@ -231,7 +229,7 @@ def test_the_mesh_that_rested_longest_leaves_a_full_cache() -> None:
     kept.cache_clear()
     files = [file_of(CLOUD_RANGES.max_triangles, seed) for seed in range(fit + 1)]
     made = [mesh_from_file("stl", file, 1.0) for file in files[:fit]]
-    # it counts triangles, not files
+    # The limit holds for triangles, not for files.
     assert kept.cache.currsize == MOST_KEPT_TRIANGLES == kept.cache.maxsize
     assert mesh_from_file("stl", files[0], 1.0) is made[0]  # now the second one has rested longest
     made.append(mesh_from_file("stl", files[fit], 1.0))

@@ -47,7 +47,7 @@ class Hold:
 
 @dataclass(frozen=True)
 class HoldWatching:
-    """The same, but it looks whether it is stopped."""
+    """The same as `Hold`, but the task checks for a stop."""
 
     folder: Path
     request_id: str = "hold-watching"
@@ -77,7 +77,7 @@ class EndEarly:
 
 @dataclass(frozen=True)
 class DieOnce:
-    """Ends its worker the first time; then its process id."""
+    """Ends its worker at the first run; the result of the second run is its process id."""
 
     folder: Path
     request_id: str = "die-once"
@@ -91,7 +91,7 @@ class DieOnce:
 
 @dataclass(frozen=True)
 class TimeLeft:
-    """The time until its deadline [s]."""
+    """The result is the time until the deadline [s]."""
 
     request_id: str = "time-left"
 
@@ -101,9 +101,7 @@ class TimeLeft:
 
 @dataclass(frozen=True)
 class Die:
-    """Ends its worker like a crash in native code, and leaves a note in the folder, if there is
-    one.
-    """
+    """Ends its worker like a crash in native code, and leaves a note in the folder, if any."""
 
     folder: Path | None = None
     request_id: str = "die"
@@ -127,7 +125,9 @@ class Fail:
 
 @dataclass(frozen=True)
 class Count:
-    """Tells numbers up to `total`, as events of a search or as steps, then its process id."""
+    """Tells numbers up to `total`, as events of a search or as steps; the result is the
+    process id.
+    """
 
     total: int
     request_id: str = "count"

@@ -203,7 +203,7 @@ class QueueMachine(RuleBasedStateMachine):
     @precondition(lambda self: self.busy)
     @rule(data=st.data())
     def task_ends(self, data: st.DataObject) -> None:
-        """It is done, or the worker has ended it because it was told to."""
+        """The task is done, or its worker has ended it after a stop."""
         worker = data.draw(st.sampled_from(self.busy))
         self._within(lambda: self._end(worker, worker.end))
 
@@ -309,7 +309,7 @@ class QueueMachine(RuleBasedStateMachine):
 
 
 def test_a_request_that_gave_its_worker_back_waits_beside_no_idle_one() -> None:
-    """Its client has the other worker all the time."""
+    """The other worker serves the same client all the time."""
     machine = QueueMachine()
     for client in "aab":
         machine.arrives(client, 1e6)

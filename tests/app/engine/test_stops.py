@@ -76,12 +76,12 @@ async def test_a_task_that_does_not_look_is_killed_after_the_grace(
 
 @settings(stop_grace=NEVER_KILLED, queue_size=4)
 async def test_a_stop_ends_no_following_task(bench: Bench) -> None:
-    """Many stops beside the end of a task, and the next task at once."""
+    """Stops arrive around the end of a task, with the next task right behind them."""
     (pid,) = bench.engine.worker_pids
     rng = random.Random(0)
     for _ in range(200):
         running = asyncio.create_task(bench.engine.run(ProcessId(), LONG))
-        # some before they are sent, some after they are answered
+        # some stops come before the task is sent, some after its answer
         for _ in range(rng.randrange(8)):
             await asyncio.sleep(0)
         await asyncio.sleep(rng.choice([0.0, 0.0003, 0.001]))

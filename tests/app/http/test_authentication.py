@@ -130,7 +130,7 @@ def test_everything_else_needs_one(guarded: Guarded, document: dict[str, Any]) -
     ],
 )
 def test_no_spelling_of_a_path_gets_around(guarded: Guarded, path: str) -> None:
-    """Sent as it is: clients normalise paths."""
+    """The path is sent over a socket as it is, because clients normalise paths."""
     host, port = guarded.server.url.removeprefix("http://").split(":")
     with socket.create_connection((host, int(port)), timeout=ANSWER) as connection:
         connection.sendall(

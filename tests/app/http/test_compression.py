@@ -31,7 +31,7 @@ POSE = {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0
 def sent(
     server: Server, path: str, body: bytes | None, **headers: str
 ) -> tuple[http.client.HTTPResponse, bytes]:
-    """The answer as its bytes are on the wire: no client unpacks it."""
+    """The answer with its bytes from the wire, not unpacked by a client."""
     connection = http.client.HTTPConnection(server.url.removeprefix("http://"), timeout=ANSWER)
     connection.putrequest("GET" if body is None else "POST", path, skip_accept_encoding=True)
     given = {name.replace("_", "-"): value for name, value in headers.items()}
@@ -283,7 +283,7 @@ def test_a_bomb_is_never_whole_in_memory(coding: str) -> None:
 
 @pytest.mark.parametrize(("coding", "whole"), [("gzip", WHOLE), ("zstd", WHOLE_ZSTD)])
 def test_the_messages_of_an_unpacked_body_end(coding: str, whole: bytes) -> None:
-    """Routes wait for the end of the connection after the body: it must come through."""
+    """Routes wait for the end of the connection after the body, so its message must reach them."""
     arriving: list[Message] = [
         {"type": "http.request", "body": whole[k : k + 1], "more_body": True}
         for k in range(len(whole))

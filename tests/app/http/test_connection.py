@@ -134,7 +134,7 @@ def test_a_client_that_has_left_is_not_timed(strict: Server) -> None:
     for _ in range(MOST_OF_CLIENT):
         with connected(strict) as leaving:
             leaving.sendall(post("/evaluate", b"{", declared=1000))
-    # whoever connects later is given as much time, and is told when it is over
+    # A later client has as much time, and learns of its end.
     with connected(strict) as later:
         checked(RequestTimeout, answer_on(later).problem)
         assert ends(later)

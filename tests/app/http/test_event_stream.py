@@ -128,7 +128,7 @@ def open_stream(server: Server) -> Any:
 
 
 def first_event(stream: httpx2.Response) -> str:
-    """Read by single lines: an event comes while the search runs."""
+    """The stream is read by single lines, because an event comes while the search runs."""
     return next(stream.iter_lines())
 
 

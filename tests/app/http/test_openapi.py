@@ -123,7 +123,7 @@ def test_what_takes_figures_tells_that_they_may_be_unknown(document: dict[str, A
         figures = any("figures" in schemas[name].get("properties", {}) for name in taken)
         if figures and "UnknownFigures" not in named(post["responses"], document):
             silent.add(path)
-    # a request of a job meets its problem when its turn comes
+    # a request of a job gets its problem when its turn comes
     assert silent == {"/jobs"}
 
 
@@ -271,7 +271,7 @@ def test_the_document_has_no_words_that_generators_of_clients_refuse(
     collect(document["components"]["schemas"], "")
     collect(document["paths"], "")
     assert refused == []
-    # the meaning stays: a constant is a choice of one, and a default is told in words
+    # The meaning stays: a constant is a choice of one, and the description names the default.
     schemas = document["components"]["schemas"]
     assert schemas["SharedBus"]["properties"]["mode"]["enum"] == ["shared"]
     assert '{"mode": "shared"}' in schemas["OptimizeRequest"]["properties"]["bus"]["description"]

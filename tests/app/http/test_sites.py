@@ -127,7 +127,7 @@ def test_only_an_allowed_page_sees_an_answer(service: Server) -> None:
 def by_host(
     service: Server, *hosts: str, path: str = "/studies", version: str = "1.1"
 ) -> httpx2.Response:
-    """The answer to a request with these lines Host, as they are."""
+    """The answer to a request with these Host lines, unchanged."""
     host, port = service.url.removeprefix("http://").split(":")
     lines = [
         f"GET {path} HTTP/{version}",

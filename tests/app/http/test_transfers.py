@@ -72,7 +72,7 @@ def test_bodies_count_against_a_share_and_a_total(tight: Server, path: str) -> N
         assert (
             asked(tight, THIRD, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").status == 200
         )
-        # and an answer, too, needs room
+        # an answer needs room, too
         large = b"GET /docs/swagger-ui-bundle.js HTTP/1.1\r\nHost: localhost\r\n\r\n"
         checked(TooManyRequests, asked(tight, "127.0.0.1", large).problem)
         checked(Busy, asked(tight, THIRD, large).problem)

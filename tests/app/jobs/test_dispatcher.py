@@ -120,7 +120,7 @@ async def test_a_second_service_takes_over_and_the_late_answer_is_dropped(store:
     # The first dispatcher stands still, so it renews no lease.
     second.moved = LEASE + timedelta(seconds=5)
     await until(lambda: is_done(second, job_id))
-    # it has lost the lease, and sees it by itself
+    # it notices the loss of the lease by itself
     await until(lambda: first.work.stopped == [0])
     first.work.free.set()
     await first.dispatcher.stop()

@@ -70,7 +70,7 @@ async def test_progress_within_a_long_request_is_an_event(store: Store, service:
 
 
 async def test_time_left_of_an_identification(store: Store, service: Service) -> None:
-    """From its fits: before the first one has ended, nothing is said."""
+    """The time left follows from the fits; before the end of the first fit, there is none."""
     job_id = await sent(service, kind=IDENTIFY)
 
     async def told() -> list[tuple[float | None, float | None]]:
@@ -134,7 +134,7 @@ async def test_nobody_listens_to_short_requests(service: Service) -> None:
 
 
 class Runner:
-    """Stands for the cluster, and for the workers of this service."""
+    """A substitute for the cluster and for the workers of this service."""
 
     def __init__(self) -> None:
         self.tasks: list[Any] = []

@@ -32,7 +32,7 @@ KNOWN = {"Cache-Control": "max-age=60"}
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A busy machine may read the store slowly."""
+    """Raises the patience with the store for a busy machine."""
     monkeypatch.setattr(answer_cache, "PATIENCE", 60.0)
 
 
@@ -191,7 +191,7 @@ def test_jobs_have_what_was_answered_and_answer_what_comes(recorded: TestClient)
     spelled_out = body | {"robot": "ur5e", "deadline": 3.0}
     lines = job(recorded, [{"optimize": body}, {"optimize": spelled_out}], KNOWN)
     for line in lines:
-        # the wall times of its search, too
+        # as well as the wall times of the search
         assert without_paths(line["result"]) == without_paths(first)
         assert line["result"]["answer"] == line["answer"] != first["answer"]
         assert (
@@ -258,7 +258,7 @@ async def test_an_equal_request_that_ends_after_a_look_at_the_store_is_not_misse
     begun = asyncio.create_task(late.answer(asked, "late", 1.0, compute, False))
     await looked.wait()
     equal = asyncio.create_task(other.answer(asked, "other", 1.0, compute, False))
-    # it either ends, or waits for the first
+    # The second request either ends, or waits for the first.
     await asyncio.wait({equal}, timeout=0.5)
     goes_on.set()
     found = [await begun, await equal]

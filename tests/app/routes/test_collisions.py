@@ -146,7 +146,7 @@ def test_ends_outside_the_cone(client: TestClient) -> None:
         answer = client.post("/optimize", json=move(**{end: {"q": q}}, tool_cone=CONE))
         content = refused(answer, InvalidRequest)
         assert content["errors"][0]["loc"] == ["body", "tool_cone"]
-        # the wrist turned by 0.5 rad tilts the tool by as much
+        # Turning the wrist by 0.5 rad tilts the tool by the same angle.
         assert "0.4" in content["detail"] and end in content["detail"]
 
 
@@ -237,9 +237,7 @@ def test_evaluate_takes_a_scene_as_a_query(client: TestClient) -> None:
 
 
 def test_a_close_pass_is_warned_of(client: TestClient) -> None:
-    """A floor 1 mm below the tool at rest, without a margin; with the usual one, the start is
-    refused.
-    """
+    """A floor 1 mm below the tool gives a warning; with the usual margin, the start is refused."""
     request = move(scene=floor(-1.0, margin=0.0), tool=EXAMPLES["over_a_post"]["tool"])
     assert answered(client, request)["warnings"] == []
     arm = to_arm(OptimizeRequest.model_validate_json(json.dumps(request)))
@@ -265,7 +263,7 @@ def test_a_given_motion_is_warned_of_too(client: TestClient) -> None:
 
 
 def test_a_tool_declares_what_it_touches(client: TestClient) -> None:
-    """A sleeve around wrist 2 is in collision with it, unless it touches it by design."""
+    """A sleeve around wrist 2 collides with the wrist unless the tool declares the contact."""
     sleeve = {"start": [0.0, 0.0, -0.03], "end": [0.0, 0.0, 0.0], "radius": 0.03}
     content = refused(
         client.post("/optimize", json=move(tool={"capsules": [sleeve]})), StartInCollision

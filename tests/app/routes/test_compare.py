@@ -88,7 +88,7 @@ def test_whole_answers_on_request_in_the_order_asked(client: TestClient) -> None
 
 
 def test_a_method_that_cannot_be_as_fast_says_so_in_its_row(client: TestClient) -> None:
-    """Between the free spline's shortest duration and the polynomial's."""
+    """The duration lies between the shortest ones of the free spline and of the polynomial."""
     shortest = {
         method: client.post("/optimize", json=MOVE | {"method": method, "duration": 0.2}).json()[
             "shortest"

@@ -42,9 +42,7 @@ def recording() -> Recording:
 
 
 def rtde(made: Recording) -> bytes:
-    """As Universal Robots' `record.py` writes it: separated by spaces, with voltage and current of
-    the arm's bus.
-    """
+    """A file of Universal Robots' `record.py`: spaces, and voltage and current of the arm's bus."""
     groups = {"actual_q": made.q, "actual_qd": made.v, "actual_current": made.current}
     names = ["timestamp", *(f"{name}_{j}" for name in groups for j in range(6))]
     names += [
@@ -67,7 +65,7 @@ def rtde(made: Recording) -> bytes:
 
 
 def jointstate(made: Recording) -> bytes:
-    """As PlotJuggler writes ROS's JointState, with the names of the joints, in another order."""
+    """A file of PlotJuggler from ROS's JointState, with named joints in another order."""
     order = [2, 1, 0, 3, 4, 5]
     names = ["__time", *(f"/joint_states/{ROBOT.joint_names[j]}/position" for j in order)]
     return table(names, np.column_stack([made.time, made.q[:, order]]), ",")

@@ -55,7 +55,7 @@ def test_figures_are_stored_shown_and_deleted(client: TestClient) -> None:
     assert made.kinematics == load_robot("ur5e").figures["kinematics"]
     shown = client.get(f"/figures/{made.id}")
     assert shown.json() == answer.json()
-    # as it is shown it can be stored, here and elsewhere, under the same id
+    # Shown figures can be stored again, here and elsewhere, under the same id.
     again = client.put("/figures", json=shown.json())
     assert (again.status_code, again.json()) == (200, shown.json())
     listed = FiguresList.model_validate_json(client.get("/figures").content).figures
@@ -254,7 +254,7 @@ def test_no_more_than_the_service_holds() -> None:
 
 
 def test_refitted_inertials_have_a_kernel_of_their_own(client: TestClient) -> None:
-    """Heavier links by figures are heavier links by the request."""
+    """Links made heavier by figures equal links made heavier by the request."""
     masses = load_robot("ur5e").figures["inertials"]
     heavier = {
         "mass": masses["mass"] | {"value": [1.5 * m for m in masses["mass"]["value"]]},

@@ -305,7 +305,7 @@ def test_other_preferences_have_no_effect(prefer: str, recorded: TestClient) -> 
 def test_settings_beside_a_json_body_are_refused(
     headers: dict[str, str], recorded: TestClient
 ) -> None:
-    """They would have no effect."""
+    """Such settings would have no effect."""
     body, query = evaluation()["evaluate"], {"drives": '{"inverter": {"constant": 1.0}}'}
     answer = recorded.post("/evaluate", json=body, params=query, headers=headers)
     (error,) = refused(answer, InvalidRequest)["errors"]

@@ -33,7 +33,7 @@ def add_log(client: TestClient) -> str:
 
 
 def add_identification(client: TestClient) -> str:
-    """It fails, as the log has no currents: it is kept with its name none the less."""
+    """A log without currents, so the identification fails, but it is kept with its name."""
     answer = client.post("/identifications", json={"logs": [add_log(client)]})
     return str(answer.json()["id"])
 

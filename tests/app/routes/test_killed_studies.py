@@ -42,7 +42,9 @@ def test_what_was_acknowledged_outlives_a_kill(kind: str, tmp_path: Path) -> Non
 
 
 def check_kill(url: str) -> None:
-    """Kills one of two servers on one database right after its answers, and asks the others."""
+    """Kills one of two servers on one database right after its answers, and asks the
+    other one and a restarted one.
+    """
     with serving(workers=1, database_url=url) as other:
         with serving(workers=1, database_url=url) as killed:
             path = begin(Over(killed))

@@ -167,7 +167,7 @@ def test_limits_of_size_and_number(recording: Recording) -> None:
         refused(
             client.post("/logs", content=packed, headers={"Content-Encoding": "gzip"}), BodyTooLarge
         )
-        # packed without saying so: unpacked by the worker
+        # packed without a header about it: the worker unpacks it
         content = refused(client.post("/logs", content=packed, headers=CSV), LogTooLarge)
         assert content["limit"] == most
         short = LOG_EXAMPLES["positions"]["value"]

@@ -58,7 +58,7 @@ def test_a_robot_is_added_shown_and_deleted(client: TestClient) -> None:
 
 
 def test_the_mjcf_of_a_robot(mine: TestClient) -> None:
-    """Of an added robot and a bundled one; MuJoCo reads it."""
+    """MuJoCo reads the MJCF of an added robot and of a bundled one."""
     for name, joints in (("mine", ["shoulder", "elbow"]), ("ur5e", None)):
         answer = mine.get(f"/robots/{name}/mjcf")
         assert (answer.status_code, answer.headers["content-type"]) == (200, "application/xml")
@@ -126,7 +126,7 @@ def test_every_endpoint_knows_it(mine: TestClient) -> None:
 
 
 def test_another_robot_of_the_same_name_is_used_at_once(mine: TestClient) -> None:
-    """Twice the friction: by `PUT` the next request has it, in whichever worker."""
+    """After a `PUT` with twice the friction, the next request in any worker uses it."""
     rubbed = ARM | {"drives": {"coulomb": [7.2, 4.8], "viscous": [6.6, 4.4]}}
     motion = {"configurations": [START, GOAL], "time_per_segment": 1.5, **MINE}
     before = [

@@ -81,8 +81,8 @@ def test_unreachable_pose(client: TestClient) -> None:
 
 
 def problem_of_ik(pose: Any) -> dict[str, Any]:
-    """The problem of a request with its task in this process, so tests can change the arm's
-    abilities.
+    """The problem of a request run in this process, so tests can change the abilities of
+    the arm.
     """
     with pytest.raises(JoulepathError) as raised:
         IKTask(IKRequest.model_validate({"pose": pose}), "the-id").run(AMPLE)
@@ -90,7 +90,7 @@ def problem_of_ik(pose: Any) -> dict[str, Any]:
 
 
 def test_singular_pose(monkeypatch: pytest.MonkeyPatch) -> None:
-    # a UR5e reaches no pose on a self-motion of unknown form only: here its known one is hidden
+    # A UR5e has a closed form of its self-motions, which is hidden here.
     monkeypatch.setattr(URClosedForm, "self_motions", lambda *_: [])
     content = problem_of_ik(UPRIGHT)
     assert content["type"] == path_of(SingularPose)

@@ -41,7 +41,7 @@ def agrees(motion: dict[str, Any]) -> None:
 
 @pytest.fixture(scope="module")
 def loaded(client: TestClient) -> dict[str, Any]:
-    """An answer with a payload and askew."""
+    """An answer with a payload and oblique gravity."""
     return client.post("/optimize", json=LOADED).json()
 
 

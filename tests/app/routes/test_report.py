@@ -157,7 +157,7 @@ def test_a_pdf_has_the_same_documents(client: TestClient) -> None:
 def test_long_names_and_amounts_stay_on_the_page(
     html: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As pictures, the pages of the PDF have white margins."""
+    """The pages of the PDF, drawn as pictures, have white margins."""
     typst = pytest.importorskip("typst")
     compiled, sides, edge = typst.compile, list[bytes](), 13 / 210
 
@@ -191,7 +191,9 @@ def test_where_nothing_keeps_every_limit_no_saving_is_claimed(client: TestClient
 
 @pytest.mark.long
 def test_a_way_that_needs_less_in_its_own_time_is_told(client: TestClient) -> None:
-    """Around the post, the fast motion and its wait need more than rounded via points."""
+    """Around the post, a motion with rounded via points needs less than the fast motion and its
+    wait.
+    """
     body = json.loads((ROOT / "examples" / "optimize" / "over_a_post.json").read_text())
     page = reported(client, optimize=body, advice=False)
     answer = attached_to(page).answer
@@ -257,7 +259,7 @@ def test_numbers_are_rounded_to_the_safe_side() -> None:
 
 
 def test_a_cell_that_no_answer_repeats_is_that_of_the_request(client: TestClient) -> None:
-    """Its body is read in a worker, and its answer leaves the arm out."""
+    """A worker reads the large body, and the answer leaves the arm out."""
     points = [[4.0 + 0.001 * k, 4.0, 0.1] for k in range(4000)]
     far = {"position": [0.0, 0.0, 0.0], "rotvec": [0.0, 0.0, 0.0]}
     cloud = {"name": "wall", "shape": "points", "points": points, "radius": 0.01, "pose": far}

@@ -153,7 +153,7 @@ def test_a_log_is_measured_against_predicted(client: TestClient, log: str) -> No
 
 
 def test_a_report_of_a_log_holds_the_log(client: TestClient, log: str) -> None:
-    """It is read again from the file alone: the database has it no longer."""
+    """The check reads the log from the file alone, after its deletion from the database."""
     page = reported(client, evaluate={"log": log})
     pdf = reported(client, evaluate={"log": log}, format="pdf") if _typst() else page
     assert client.delete(f"/logs/{log}").status_code == 204
@@ -177,7 +177,7 @@ def test_pages_of_a_table_repeat_its_head(client: TestClient, job: str) -> None:
 
 
 def test_numbers_of_stops_do_not_cover_each_other() -> None:
-    """Nor are numbers left out where there is room for them."""
+    """Numbers of stops keep their distance, and none is left out if there is room for it."""
     for count, shown in ((9, 9), (200, 40)):
         stops = [Stop((k + 0.5) / count, k + 1, False) for k in range(count)]
         legs = [Leg(k / 2, 0.5, 1.0, False, False) for k in range(2)]

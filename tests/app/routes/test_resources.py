@@ -72,8 +72,9 @@ def test_ik_of_a_spherical_wrist(client: TestClient) -> None:
 
 
 def test_another_robot_is_asked_for_by_name(client: TestClient) -> None:
-    """Its kernel is not loaded when the service starts. The same joints give another pose, and cost
-    other joules.
+    """The service does not load the robot's kernel at its start.
+
+    The same joints give another pose and other joules than the default robot.
     """
     ends = {
         "start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},

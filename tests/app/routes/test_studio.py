@@ -54,7 +54,7 @@ def test_the_page_allows_its_own_files_only(client: TestClient) -> None:
 
 
 def test_a_file_is_sent_once(client: TestClient) -> None:
-    """The tag of a compressed answer is a weak one."""
+    """The weak tag of a compressed answer avoids a second transfer, too."""
     for coding in ("identity", "gzip", "zstd"):
         headers = {"Accept-Encoding": coding}
         first = client.get("/studio/main.js", headers=headers)
@@ -79,7 +79,7 @@ def test_nothing_else_is_served(client: TestClient, path: str) -> None:
 
 
 def test_the_first_load_is_small(client: TestClient) -> None:
-    """The limit holds for the page with everything that it may load."""
+    """The page stays below the limit together with everything that it may load."""
     names = [path.name for path in PAGE.iterdir() if path.suffix not in (".html", ".txt")]
     answers = {path: client.get(path) for path in ("studio", *(f"studio/{n}" for n in names))}
     assert {answer.status_code for answer in answers.values()} == {200}
@@ -176,7 +176,7 @@ def test_pages_and_files_are_served(idle: TestClient, path: str, media_type: str
 
 @pytest.mark.parametrize("path", ["how_to", "how_to/pendant_pose", "reference/errors"])
 def test_a_page_without_its_slash_leads_to_the_page(idle: TestClient, path: str) -> None:
-    """Also behind a proxy's path: the target is relative."""
+    """The target of the redirection is relative, so it holds behind a proxy's path, too."""
     answer = idle.get(f"/help/{path}", params={"q": "a"}, follow_redirects=False)
     assert answer.status_code == 307 and answer.headers["location"] == f"{path.split('/')[-1]}/?q=a"
     assert idle.get(f"/help/{path}").url.path == f"/help/{path}/"

@@ -144,7 +144,7 @@ def test_a_given_motion_is_optimised_between_its_ends(client: TestClient) -> Non
         "objective": "electrical",
         "duration": 2.0,
     }
-    # a quintic is a B-spline, if not one on these knots: the optimum in the same time costs no more
+    # A quintic is a B-spline on other knots, so the optimum in the same time costs no more.
     assert timed["gain"] > -1e-3 * content["base"]["energy"]
     assert free["gain"] > timed["gain"]
     after = added(client, path, free["request"])

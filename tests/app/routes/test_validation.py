@@ -185,7 +185,7 @@ def test_every_json_body_is_read_strictly_as_common_clients_declare_it(
 ) -> None:
     """A body without a type, with the type of `curl -d`, or as plain text is JSON on every path.
 
-    A name occurs once.
+    Strict JSON has no repeated names.
     """
     headers = {} if content_type is None else {"content-type": content_type}
     paths = open_document()["paths"]
@@ -277,9 +277,7 @@ def test_every_unknown_field_is_named(client: TestClient) -> None:
 
 
 def test_other_errors_are_named_beside_unknown_fields(client: TestClient) -> None:
-    """All errors are named at once, at every level; but a misspelt field is not reported as
-    missing.
-    """
+    """All errors are named at once, at every level; a misspelt field is not reported as missing."""
     body = move(colour="red", deadline=-3.0, start={"q": [0.0, 0.0, "a"], "speed": 1})
     body["gaol"] = body.pop("goal")
     found = {tuple(error["loc"][1:]) for error in refused(client, body)}
@@ -287,7 +285,7 @@ def test_other_errors_are_named_beside_unknown_fields(client: TestClient) -> Non
 
 
 def test_a_missing_field_of_a_part_is_named_beside_a_similar_name(client: TestClient) -> None:
-    """The part is there under its right name, too."""
+    """The body has the part under its right name, too, with a field missing."""
     found = {tuple(error["loc"][1:]) for error in refused(client, move(payload={}, paylod=1))}
     assert ("paylod",) in found and any(loc[0] == "payload" for loc in found)
 

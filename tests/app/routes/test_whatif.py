@@ -70,7 +70,7 @@ def figures(energy: dict[str, Any], duration: float) -> dict[str, Any]:
 
 
 def deltas(outcome: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """The same of a change's outcome: value, difference, relative."""
+    """Value, difference and relative difference of a change's outcome, flat."""
     parts = {f"electrical.{name}": each for name, each in outcome["electrical"].items()}
     return {
         name: outcome[name] for name in ("duration", "mechanical", "mean_power", "peak_power")
@@ -142,9 +142,7 @@ def test_is_the_difference_of_two_optimizations(
 def test_same_motion_is_the_bases_on_the_changed_arm(
     client: TestClient, optimized: dict[str, Any], name: str
 ) -> None:
-    """The comparison is with /evaluate of the base's samples, whose splines differ from the
-    motion's.
-    """
+    """The reference is /evaluate of the base's samples; its splines differ from the motion's."""
     base = kept(client, optimized["base"]["answer"], "optimize")
     log = {field: base["trajectory"][field] for field in ("t", "q", "v", "a")}
     arm = {"payload": LOAD} | CHANGES[name]
@@ -287,9 +285,7 @@ def test_refuses_what_cannot_be_asked(
     "text", ["stored/0", "/answers/0", "{0}", "%s", "\\u007fkept/0\\u007f", '","answer":"']
 )
 def test_texts_of_the_caller_come_back_as_they_are(client: TestClient, text: str) -> None:
-    """Names of changes and of obstacles in problems come back unchanged; paths of answers are
-    valid.
-    """
+    """Names of changes and obstacles come back unchanged; paths of answers are valid."""
     pose = {"position": tcp_pose(np.array(HOME)).T[:3, 3].tolist(), "rotvec": [0, 0, 0]}
     ball = {"name": text, "shape": "sphere", "radius": 0.15, "pose": pose}
     answer = client.post(

@@ -88,7 +88,7 @@ async def test_a_missing_database_is_not_replaced_by_an_empty_one(
         await store.check()
         assert store.fault == "deleted"
     assert not database.exists()
-    # put back: used again, without a restart
+    # The file is put back and used again, without a restart.
     for path in database.parent.glob("joulepath.db-*"):
         path.unlink()
     aside.rename(database)
@@ -189,7 +189,7 @@ async def test_a_full_disk_is_freed_by_deleting(small_disk: Path) -> None:
     causes: list[StoreFault] = []
 
     async def fill(store: Store, study_id: str) -> int:
-        """Adds iterations until the disk is full; how many were acknowledged."""
+        """Adds iterations until the disk is full and returns the number of acknowledged ones."""
         count = 0
         while count < 10_000:
             try:
@@ -211,7 +211,7 @@ async def test_a_full_disk_is_freed_by_deleting(small_disk: Path) -> None:
             await store.write(partial(studies.create, study=study))
             count = await fill(store, study.id)
             assert causes.pop() == "full"
-            # nothing at all is left for others
+            # other files take all the room left
             left = os.statvfs(small_disk)
             (small_disk / "other").write_bytes(b"x" * (left.f_bavail * left.f_frsize))
             await store.check()
@@ -226,7 +226,7 @@ async def test_a_full_disk_is_freed_by_deleting(small_disk: Path) -> None:
             await store.check()
             assert store.fault is None
             (small_disk / "other").unlink()
-            # the last round has no reserve left to begin with: the log's own space does
+            # The last round starts without a reserve; the room of the log suffices.
             await store.check()
         kept = await store.write(put)
         assert (await store.read(partial(answers.get, answer_id=kept)))[1] == b"{}"

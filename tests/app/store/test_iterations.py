@@ -59,7 +59,7 @@ async def test_each_knows_the_best_so_far(store: Store) -> None:
     best, last = state.best, state.last
     assert best is not None and last is not None
     assert (best.number, last.number, last.met_by) == (4, 6, 2)
-    # one at a time, or all at once: the same
+    # added one at a time, or all at once, with the same outcome
     history = entries(await store.read(partial(studies.history, study_id=study.id)))
     assert [
         entry.items() <= each.model_dump().items()

@@ -179,7 +179,7 @@ async def test_owners_take_turns_however_many_jobs_they_have(bench: Bench) -> No
 
 
 async def test_the_owner_that_was_served_last_comes_last(bench: Bench) -> None:
-    """One request at a time, as with a single worker."""
+    """Owners take turns by single requests, as with a single worker."""
     served = list[str | None]()
     await bench.create(30, owner="long")
     await bench.create(3, owner="short")

@@ -54,7 +54,7 @@ def put(session: Any, body: bytes = b"{}", kind: str = "optimize", owner: str | 
 
 
 def until_refused(server: Server, cause: str | None) -> None:
-    """Until `/readyz` names this cause; None: until it is ready."""
+    """Waits until `/readyz` names this cause, or is ready if the cause is None."""
     end = time.monotonic() + WARM_UP
     while True:
         assert time.monotonic() < end, f"/readyz never says {cause}"
@@ -208,9 +208,7 @@ def test_a_new_file_that_another_process_makes_is_waited_for(tmp_path: Path) -> 
 async def test_a_service_waits_while_another_one_migrates(
     server: Postgres, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also for longer than PostgreSQL may take for an ordinary answer: the first request is not
-    refused.
-    """
+    """The first request waits even longer than PostgreSQL may take for an ordinary answer."""
     monkeypatch.setattr(database, "DATABASE", replace(database.DATABASE, server_timeout=0.5))
     with create_database_engine(server.url).begin() as connection:
         connection.execute(text("DROP SCHEMA public CASCADE"))
