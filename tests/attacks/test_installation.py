@@ -151,7 +151,7 @@ def build(source: Path, folder: Path, **environment: str) -> subprocess.Complete
 def test_the_wheel_of_a_clean_clone_computes_and_shows_the_studio(
     clone: Path, tmp_path: Path, has_programs: bool
 ) -> None:
-    """The claim holds also for npm and the C compiler as build requirements."""
+    """The build also works where npm and a C compiler come as build requirements."""
     if has_programs and shutil.which("npm") is None:
         pytest.skip("there is no npm on this machine")
     (tmp_path / "empty").mkdir()
@@ -190,7 +190,7 @@ def test_the_wheel_of_a_clean_clone_computes_and_shows_the_studio(
 @pytest.mark.long
 @in_a_repository
 def test_the_source_archive_has_what_its_wheel_needs(clone: Path, tmp_path: Path) -> None:
-    """The source archive is made with npm's registry, and the wheel of it without any network.
+    """The source archive needs npm's registry, but a wheel is built from it without the registry.
 
     Machine code is in the wheel alone.
     """

@@ -98,7 +98,7 @@ def test_what_is_found_can_be_chosen(here: Here, logs: list[str], tmp_path: Path
     assert here.run("identify", logs[0], *chosen, "--payload", "0", "-o", str(output))[0] == 0
     result = RESULT.model_validate_json(output.read_bytes())
     found = {each.figure for each in result.parameters}
-    # The log has power; the command adds it by itself.
+    # The log has power, so the figures of the power are added by themselves.
     assert found == {
         "torque_constant",
         "coulomb",

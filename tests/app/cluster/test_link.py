@@ -300,7 +300,7 @@ def other_version(folder: Path) -> None:
 async def test_a_scheduler_without_this_version_gets_nothing(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, there: str, reason: str
 ) -> None:
-    """A scheduler of another version cannot read the requests and would fail all of them."""
+    """A scheduler reads the tasks it passes on, so another version would fail every request."""
     if there == "another":
         other_version(tmp_path)
     with scheduler_process(tmp_path) as (_, address):

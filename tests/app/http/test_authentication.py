@@ -136,7 +136,7 @@ def test_no_spelling_of_a_path_gets_around(guarded: Guarded, path: str) -> None:
         connection.sendall(
             f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode()
         )
-        # An unknown path that is public has a response of its own; all other paths are refused.
+        # Only public paths have other responses, such as 404 for an unknown one.
         assert connection.recv(1000).split()[1] in (b"401", b"404", b"400")
 
 

@@ -105,7 +105,7 @@ async def test_one_is_computed_and_the_others_get_its_answer(
 
 
 async def test_a_service_without_workers_takes_nothing(store: Store, service: Service) -> None:
-    """A known answer does not occupy a request of a service whose cluster is lost."""
+    """The cluster may be lost right after a request with a known answer."""
     service.work.free.set()
     service.dispatcher.start()
     await done(service, asks())
