@@ -120,7 +120,7 @@ def test_derivatives_stay_below_their_bounds_and_come_near(name: str, near: floa
 
 
 def test_a_pendulum_has_the_derivatives_of_its_closed_form() -> None:
-    """Two links that turn about parallel axes: M_00 = a + 2 b cos q_1, M_01 = c + b cos q_1."""
+    """The inertia of two links with parallel axes: M_00 = a + 2 b cos q_1, M_01 = c + b cos q_1."""
 
     def inertia(q: Array) -> Array:
         cosine = np.cos(q[:, 1])

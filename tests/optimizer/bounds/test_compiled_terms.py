@@ -90,7 +90,10 @@ def test_points(name: str) -> None:
 
 @pytest.mark.parametrize("name", ARMS)
 def test_least_potential_and_greatest_speed_terms(name: str) -> None:
-    """For cells of durations side by side, and for one duration, with light and heavy weights."""
+    """Both libraries give the same terms, for adjacent cells of durations and for one duration.
+
+    The weights are light and heavy.
+    """
     for seed in range(2):
         case, rng = Case.of(name, seed), np.random.default_rng(10 + seed)
         friction = FrictionConjugate.of(case.arm.friction_law, case.arm.active_limits.v_max)

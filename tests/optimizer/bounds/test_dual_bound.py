@@ -98,8 +98,10 @@ def around(
 
 @pytest.mark.parametrize("name", long_but(("load, all recovered",), CONDITIONS))
 def test_no_motion_spends_less(name: str) -> None:
-    """Straight and bent motions of every duration from the shortest on, with paths, multipliers and
-    weights at random."""
+    """The bound is below straight and bent motions with all durations from the shortest on.
+
+    Paths, multipliers and weights are random.
+    """
     task = problem(objective="electrical", duration_max=500.0, **CONDITIONS[name])
     torques, rng = Torques(task), np.random.default_rng(len(name))
     seen, useful = 0, 0
@@ -287,8 +289,9 @@ LEEWAY = 1e-9  # rounding: rad, or W
 
 
 def test_the_conjugate_is_the_greatest_value() -> None:
-    """Against a search over the speed, for multipliers of both signs, limits on the speed, and
-    stiffness to spare.
+    """The conjugate is the greatest value of a search over the speed.
+
+    The cases include multipliers of both signs, limits on the speed, and excess stiffness.
     """
     law, rng = ROBOT.friction, np.random.default_rng(2)
     friction = FrictionConjugate.of(law, ROBOT.limits.v_max)

@@ -69,9 +69,7 @@ def bound_of_samples(task: Problem, pose: ConeOrientedPose, count: int) -> float
     ],
 )
 def test_the_bound_holds_for_the_whole_family(half_angle: float, condition: str) -> None:
-    """It is below the bound of every configuration sampled, at every depth of the search, and rises
-    with depth.
-    """
+    """The bound is below all sampled configurations at every depth, and rises with depth."""
     rng, given = np.random.default_rng(4), CONDITIONS[condition]
     for _ in range(3):
         start, goal = rng.uniform(-np.pi, np.pi, (2, 6))
@@ -106,7 +104,10 @@ def test_the_bound_holds_for_any_chain(nq: int, given: dict[str, Any]) -> None:
 
 
 def test_the_bound_tells_far_from_near() -> None:
-    """On the other side of the base, the first joint's half turn alone is most of the energy."""
+    """The bound of a goal across the base is far higher than the bound of a near goal.
+
+    The half turn of the first joint alone needs most of the energy.
+    """
     task = problem(HOME, GOAL)
     opposite = tcp_pose(HOME).T[:3, 3] * np.array([-1, -1, 1])
     near, far = (

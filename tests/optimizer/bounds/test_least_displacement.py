@@ -19,7 +19,7 @@ LIMITS = Limits(np.array([-2.9, -4.0]), np.array([2.9, 14.0]), ONES, ONES, ONES,
 
 
 def turned_inside(q: Array) -> list[Array]:
-    """q (nq,) [rad] with every full turn that the limits allow."""
+    """q (nq,) [rad] with every full turn inside the limits."""
     turns = (q + 2 * np.pi * np.array(each) for each in product(range(-4, 5), repeat=NQ))
     return [each for each in turns if (each >= LIMITS.q_min).all() and (each <= LIMITS.q_max).all()]
 

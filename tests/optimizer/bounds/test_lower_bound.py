@@ -145,8 +145,9 @@ def bound(torques: Torques, start: Array, goal: Array, **given: Any) -> tuple[Ar
 
 @pytest.mark.parametrize("name", long_but(("loaded and tilted",), CONDITIONS))
 def test_no_motion_spends_less(name: str) -> None:
-    """Thousands of motions over all conditions, electrical and mechanical, with free duration and
-    with their own.
+    """The bound is below thousands of motions over all conditions.
+
+    Both objectives have a free duration; the electrical one also has the duration of each motion.
     """
     task = problem(objective="electrical", duration_max=500.0, **CONDITIONS[name])
     torques = Torques(task)
@@ -361,7 +362,10 @@ def test_duration_bounds_raise_the_bound() -> None:
 
 
 def test_longer_travel_never_lowers_the_bound() -> None:
-    """Joint by joint, with potential_gain as it is; the least duration grows as well."""
+    """More displacement of one joint raises the bound and the least duration.
+
+    The potential gain stays the same.
+    """
     rng = np.random.default_rng(9)
     for name, conditions in CONDITIONS.items():
         if name == "wide reversal":
@@ -396,9 +400,7 @@ def test_tighter_limits_never_lower_the_bound() -> None:
 
 
 def test_mechanical_bound_is_the_climb() -> None:
-    """By hand: 2 kg on the flange lifted with the arm; the work against gravity is the least, up or
-    down.
-    """
+    """The least mechanical work is the work against gravity: 2 kg on the flange plus the arm."""
     task = PreparedProblem.of(problem(objective="mechanical", duration_max=5.0))
     ours, _ = lower_bounds(task, np.ones((2, 6)), np.array([12.0, -7.0]))
     assert ours.tolist() == [12.0, 7.0]

@@ -29,7 +29,7 @@ from tests.selection import long_but
 QUADRATURE = 1e-4
 # J; differences of potential energies of some 100 J in double precision
 EXACT = 1e-9
-# J; what the bound gives away for rounding and for axes that are not quite parallel to gravity
+# J; allowance of the bound for rounding and for axes not quite parallel to gravity
 GIVEN_AWAY = 1e-4
 # J/rad; central differences over 1e-5 rad
 DIFFERENCE = 1e-6
@@ -63,8 +63,9 @@ def bound(task: PreparedProblem, start: Array, goal: Array) -> Array:
 
 @pytest.mark.parametrize("name", CONDITIONS)
 def test_what_the_proof_uses_holds(name: str) -> None:
-    """The wave of the leading joint, the slopes of the potential and the kinetic energy, against
-    Pinocchio.
+    """The proof's assumptions agree with Pinocchio.
+
+    They concern the wave of the leading joint, the slopes of the potential, and the kinetic energy.
     """
     task = prepared(1.0, **CONDITIONS[name])
     reach, model, rng = EnergyRange(task), task.model, np.random.default_rng(1)
@@ -90,8 +91,9 @@ def test_what_the_proof_uses_holds(name: str) -> None:
 
 
 def test_the_leading_joint_is_the_first_that_lifts() -> None:
-    """The shoulder pan of an upright arm turns about the vertical; on a wall it lifts the whole
-    arm.
+    """The leading joint is the first joint able to lift the arm.
+
+    The shoulder pan of an upright arm turns about the vertical; on a wall it lifts the whole arm.
     """
     assert EnergyRange(prepared(1.0)).leading == 1
     assert EnergyRange(prepared(1.0, **CONDITIONS["hanging"])).leading == 1
@@ -117,7 +119,10 @@ def _random_motion(rng: np.random.Generator, start: Array, goal: Array, rates: A
 @pytest.mark.parametrize("count", long_but((80,), (80, 150)))
 @pytest.mark.parametrize("name", CONDITIONS)
 def test_no_random_motion_does_less_work(name: str, count: int) -> None:
-    """Short and long, direct and on detours, with full turns, as fast as possible and slow."""
+    """The bound is below random motions, short and long, direct and with detours, fast and slow.
+
+    Some motions have full turns.
+    """
     rng = np.random.default_rng(2)
     task = prepared(1.0, **CONDITIONS[name])
     own = task.problem.arm.active_limits
@@ -134,8 +139,7 @@ def test_no_random_motion_does_less_work(name: str, count: int) -> None:
         )
         assert ours <= work * (1 + QUADRATURE) + EXACT
         stronger += ours > abs(task.potential(goal) - task.potential(start)) + EXACT
-    # the barrier and the travel were attacked, not the climb alone; what a tilted first joint lifts
-    # is less than R
+    # the attack covers barrier and travel besides the climb; a tilted first joint lifts less than R
     assert stronger > 3 or EnergyRange(task).leading == 0
 
 
@@ -143,8 +147,10 @@ def test_no_random_motion_does_less_work(name: str, count: int) -> None:
     "name", long_but(["slow limits"], ["as it comes", "slow limits", "weightless"])
 )
 def test_no_descent_gets_below(name: str) -> None:
-    """The mechanical work is minimised from random guesses between the ends where the bound exceeds
-    the climb most.
+    """The bound is below minimised mechanical work.
+
+    The descents start at random guesses, between ends with the largest excess of the bound over the
+    climb.
     """
     rng = np.random.default_rng(3)
     own = prepared(1.0, **CONDITIONS[name]).problem.arm.active_limits
@@ -177,15 +183,16 @@ def test_no_descent_gets_below(name: str) -> None:
 
 
 def test_over_the_top() -> None:
-    """By hand: from hanging over the top and down again; the upper arm alone is lifted by twice its
-    weight's height.
+    """The work of a swing from hanging over the top and down again, calculated by hand.
+
+    The upper arm alone rises by twice the height of its centre.
     """
     task = prepared(10.0)
     hanging = np.array([0.0, np.pi / 2, 0.0, 0.0, 0.0, 0.0])
     turned = hanging - 2 * np.pi * np.eye(6)[1]
     ends = task.potential(hanging), task.potential(turned)
     assert ends[0] == pytest.approx(ends[1], abs=EXACT)
-    # upper arm of 8.058 kg, its centre at half of 0.425 m, and 5.881 kg beyond, which may stay down
+    # upper arm of 8.058 kg with its centre at half of 0.425 m; the 5.881 kg beyond may stay down
     lifted = 9.81 * (8.058 * 0.2125 + 5.881 * 0.425)
     top = EnergyRange(task).lumped[1] + lifted - EnergyRange(task).lumped[2]
     assert bound(task, hanging[None], turned[None])[0] == pytest.approx(
@@ -194,9 +201,7 @@ def test_over_the_top() -> None:
 
 
 def test_weightless_travel() -> None:
-    """One joint without gravity: rotor and link must be moved; the bound knows the rotor's part of
-    it.
-    """
+    """Without gravity, one joint still moves its rotor and link; the bound covers the rotor."""
     task = prepared(2.0, gravity=[0, 0, 0])
     start, goal = np.zeros(6), np.eye(6)[5]
     own, rotor = task.problem.arm.active_limits, float(task.problem.arm.drives.rotor_inertia[5])

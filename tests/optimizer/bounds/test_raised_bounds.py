@@ -120,7 +120,7 @@ def test_nothing_changes_where_it_does_not_apply() -> None:
 
 
 def test_no_bound_is_begun_that_would_end_late() -> None:
-    """With many joints it takes several times as long."""
+    """Raising starts only if it ends before the deadline, and more joints take more time."""
     made, found = bounded(problem(OUT, TURNED, robot=load_robot("ur20")))
     plain, left = found[0].lower_bound, 2 * RAISING.quick.effort.time
     raise_all(made, found, ENOUGH, Deadline.after(RAISING.quick.effort.time / 2))

@@ -89,8 +89,9 @@ def test_no_motion_draws_less_however_it_is_cut(name: str) -> None:
 
 
 def test_bounds_from_rest_to_rest_do_not_hold_where_the_arm_passes() -> None:
-    """Cut into many parts, the motion of least energy draws less than these say: the attack above
-    can fail.
+    """Sums of bounds from rest to rest exceed the energy of a motion cut into many parts.
+
+    The attack above can therefore fail for a wrong bound.
     """
     found = optimize(problem())
     q = found.trajectory.spline.curve(np.linspace(0, found.duration, 41))

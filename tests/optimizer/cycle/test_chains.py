@@ -66,7 +66,10 @@ def test_it_is_the_least_of_all_while_costs_rise_and_fall(seed: int, closed: boo
 
 
 def test_of_equal_closed_chains_the_first_is_taken() -> None:
-    """Turns of a joint lead to chains of the same cost; a cycle has one answer all the same."""
+    """Of several closed chains with equal cost, the search returns the first one.
+
+    Full turns of a joint lead to chains with equal costs.
+    """
     cost = np.random.default_rng(0).uniform(1.0, 2.0, (3, 3))
     costs = [np.tile(cost, (4, 4)) for _ in range(3)]
     value, nodes = LeastChain(costs, True).find()

@@ -50,7 +50,10 @@ class Replayed:
 
 @pytest.mark.long
 def test_a_cycle_and_its_savings() -> None:
-    """Of moves with and without payload, dwells and a wait, evaluated again with drawn figures."""
+    """The interval of a cycle's energy and savings matches a new evaluation with drawn figures.
+
+    The cycle has moves with and without payload, dwells and a wait.
+    """
     stops = [
         Stop(name="pick", target=GOAL, dwell=0.4, payload=PAYLOAD),
         Stop(name="place", target=START + 0.3, dwell=0.2, payload=Payload()),

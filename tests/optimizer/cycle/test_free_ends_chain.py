@@ -142,7 +142,7 @@ def _least_of_some(asked: Cycle, chain: FreeEndsChain, rng: np.random.Generator)
     long_but([(2, "ur10e")], [(k, robot) for k in range(3) for robot in ("ur5e", "ur10e")]),
 )
 def test_no_chain_has_less(seed: int, robot: str) -> None:
-    """A free end at both sides of the path, at its start, and at its goal."""
+    """The bound is below chains with free ends at the start or goal of the path, or both."""
     asked = _cycle(seed, robot)
     chain = _chain(asked)
     bound = chain.least(NEVER)

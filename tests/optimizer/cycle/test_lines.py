@@ -97,7 +97,10 @@ def test_what_is_grasped_is_no_obstacle_on_the_lines() -> None:
 
 
 def test_a_redundant_arm_approaches_as_it_was_followed_from_the_stop() -> None:
-    """Traced from its outer end, the line would lead to another configuration of the stop."""
+    """The line to a stop of a redundant arm is traced from the stop.
+
+    From the outer end, the line would lead to another configuration of the stop.
+    """
     stop = Stop(name="stop", target=np.array([0.5, -0.3, 0.4, -1.8, 0.3, 1.8, 0.7]), approach=INTO)
     found = plan_cycle(
         Cycle(

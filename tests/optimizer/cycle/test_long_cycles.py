@@ -96,7 +96,10 @@ def test_moves_with_the_same_payload_share_an_arm() -> None:
 
 
 def test_each_arm_of_a_cycle_has_one_collision_model(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two stops and the start share the models of the arm with the part and without it."""
+    """A cycle builds one collision model with the part and one without it.
+
+    The start and both stops share the two models.
+    """
     built = list[Arm]()
 
     def counted(arm: Arm) -> CollisionModel:

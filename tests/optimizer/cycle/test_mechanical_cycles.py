@@ -66,7 +66,7 @@ def test_the_cycle_is_true(time: float, method: MethodName) -> None:
 
 
 def test_no_random_cycle_gets_below_the_bound() -> None:
-    """Random chains, every move at an even pace in its random share of the time."""
+    """The bound is below random chains with an even pace in random shares of the time."""
     rng, layers, bound = (
         np.random.default_rng(0),
         list(layers_of(ASKED).values()),

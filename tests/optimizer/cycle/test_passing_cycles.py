@@ -272,7 +272,7 @@ def test_a_motion_has_a_dozen_passes_at_most() -> None:
 
 @pytest.mark.long
 def test_passes_at_the_same_place_are_one() -> None:
-    """Twice in a row, at the start and at the goal: the curve is there already."""
+    """Repeated passes at one place, at the start or at the goal, cost nothing."""
     places = [HOME, Q[0], Q[0], Q[1]]
     stops = [Stop(name=f"{k}", target=q, via=True) for k, q in enumerate(places)]
     found = plan_cycle(of(*stops, Stop(name="rest", target=Q[1]), closed=False))

@@ -301,7 +301,10 @@ def test_it_is_divided_where_the_reconfiguration_has_the_least_bound() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_the_parts_are_as_few_and_as_cheap_as_can_be(seed: int) -> None:
-    """Against all ways through drawn segments, by shortest paths one change after the other."""
+    """The division has the fewest parts, and the least cost among divisions with as many parts.
+
+    The reference enumerates all ways through random segments by shortest paths.
+    """
     rng = np.random.default_rng(seed)
     ends = np.sort(rng.integers(0, len(PLACES), (6, 2)), axis=1)
     ends[0, 0], ends[1, 1] = 0, len(PLACES) - 1

@@ -111,7 +111,10 @@ def test_no_motions_with_the_storage_get_below_the_bound() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_repeated_cycle_ends_with_the_charge_with_which_it_begins(seed: int) -> None:
-    """Against going round and round, from any charge; and the energies add up with any cuts."""
+    """The charge of a repeated cycle equals the limit of many rounds, from any initial charge.
+
+    The energies of the parts add up to the energy of the whole.
+    """
     rng = np.random.default_rng(seed)
     bus = Bus("storage", 0.9, float(rng.uniform(0.5, 20.0)), float(rng.uniform(10.0, 200.0)))
     demands = [Demand(rng.normal(0.3 * rng.normal(), 3.0, 12), np.full(12, 0.05)) for _ in range(3)]
@@ -134,7 +137,10 @@ def test_a_repeated_cycle_ends_with_the_charge_with_which_it_begins(seed: int) -
 
 
 def test_a_rest_in_two_parts_is_one_rest() -> None:
-    """The brakes engage once, after their delay."""
+    """A rest in two parts needs the same energy as a whole rest.
+
+    The brakes engage once, after their delay.
+    """
     asked = replace(ASKED, hold="brakes", brake_delay=0.3, brake_power=20.0)
     whole, parts = _rest(asked, [0.0, 1.0]), _rest(asked, [0.0, 0.2, 1.0])
     assert parts == pytest.approx(whole)

@@ -158,7 +158,7 @@ def test_bounds_on_the_time_leave_a_cycle_alone_that_keeps_them() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("seed", long_but([0], range(10)))
 def test_the_bound_holds_for_every_chain_and_share(seed: int) -> None:
-    """Random chains of configurations, in random shares of the time, need no less."""
+    """Random chains of configurations, in random shares of the time, need at least the bound."""
     asked = pick_and_place(seed, 2, windings=False)
     only = BranchFilter(elbow="up")
     asked = replace(asked, stops=[replace(stop, branch=only, dwell=0.0) for stop in asked.stops])

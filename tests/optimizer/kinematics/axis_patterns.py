@@ -25,7 +25,7 @@ RELATIONS: tuple[Relation, ...] = (
     "oblique meeting",
     "same centre",
 )
-# largest of the smallest singular values at random configurations, below which an arm is degenerate
+# limit on the smallest singular values of a degenerate arm, at all random configurations
 DEGENERATE = 5e-3
 
 UR_AXES = JointAxes.of(Chain.of(UR5E.model))
@@ -41,9 +41,10 @@ def shifted(ahead: float, beside: float) -> JointAxes:
 
 
 def random_axes(pattern: tuple[Relation, ...], rng: np.random.Generator) -> JointAxes:
-    """Axes of which each stands in a relation of the pattern (5,) to the one before.
+    """Random axes with the relations of a pattern (5,) between neighbours.
 
-    `same centre` is at a right angle to it, through the point where it meets the one before.
+    An axis of relation `same centre` is perpendicular to its predecessor and goes through the
+    intersection of the predecessor with the axis before.
     """
     directions, points = [_unit(rng.normal(size=3))], [rng.uniform(-0.3, 0.3, 3)]
     for relation in pattern:

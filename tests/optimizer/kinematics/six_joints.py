@@ -69,7 +69,7 @@ def inside(robot: Robot, rng: np.random.Generator) -> Array:
 
 
 def calibrated(robot: Robot, off: float, seed: int = 0) -> Robot:
-    """Robot with each joint's frame displaced by up to `off` [m, rad] along and about each axis."""
+    """Robot with every joint's frame displaced by up to `off` [m, rad] along and about all axes."""
     rng, model = np.random.default_rng(seed), robot.model.copy()
     for j in range(1, 7):
         M = model.jointPlacements[j]

@@ -18,12 +18,13 @@ from tests.optimizer.chains import serial_chain
 CHAINS = [Chain.of(load_robot("gen3").model), Chain.of(serial_chain(7).model)]
 # sizes of joint moves [rad]
 STEPS = (3e-2, 3e-3, 3e-4)
-# third-order remainder over the cube of the move: a length of the arm times the number of joints
-# that turn it [m/rad³]
+# third-order remainder over the cube of the move: a length of the arm times the number of turning
+# joints [m/rad³]
 THIRD_ORDER = 40.0
-# largest pose error of a point on a curve, with each joint off by some ACROSS.tolerance [m, rad]
+# largest pose error of a point on a curve, with errors of all joints up to ACROSS.tolerance [m,
+# rad]
 EXACT = 10 * ACROSS.tolerance
-# share of a step, or length, that rounding changes next to a singularity
+# share of a step, or length, changed by rounding next to a singularity
 ROUNDING = 1e-9
 # displacement along a direction [rad]
 AHEAD = 0.03
@@ -59,7 +60,7 @@ def test_a_projected_point_is_on_the_curve_across_the_given_direction() -> None:
 
 
 def test_many_points_take_the_same_steps_as_few() -> None:
-    """Many points are solved by orthogonalised rows, few points by LAPACK."""
+    """Few points, solved by LAPACK, take the same steps as many points, by orthogonalised rows."""
     rng = np.random.default_rng(73)
     for chain in CHAINS:
         q = rng.uniform(-2.0, 2.0, (ACROSS.many + 10, 7))
@@ -76,7 +77,10 @@ def test_many_points_take_the_same_steps_as_few() -> None:
 
 
 def test_steps_at_singular_configurations_are_numbers() -> None:
-    """With many and with few points, of a straight arm and of nearly straight ones."""
+    """Steps at singular configurations are finite, for few and many points.
+
+    The arms are straight and nearly straight.
+    """
     rng, chain = np.random.default_rng(76), CHAINS[0]
     for size in (0.0, 1e-9):
         for n in (3, ACROSS.many + 3):
@@ -90,7 +94,7 @@ def test_steps_at_singular_configurations_are_numbers() -> None:
 
 
 def test_a_displaced_point_is_on_the_curve_at_the_given_displacement() -> None:
-    """With short steps, too: later steps cover the rest of the displacement."""
+    """A displaced point is on the curve, even with short steps, as later steps cover the rest."""
     rng, chain = np.random.default_rng(74), CHAINS[0]
     q = rng.uniform(-2.0, 2.0, 7)
     T, jacobian = chain.flange_and_jacobian(q[None])

@@ -1,6 +1,4 @@
-"""Boxes around all configurations of a pose, for seven-joint arms that nearly have a closed
-form.
-"""
+"""Boxes around all configurations of a pose, for seven-joint arms without an exact closed form."""
 
 from __future__ import annotations
 
@@ -29,7 +27,7 @@ GEN3_OFF = 0.36e-3
 
 
 def skewed() -> Robot:
-    """Panda with axes displaced by some tenths of a millimetre, as calibration finds them."""
+    """Panda with axes displaced by some tenths of a millimetre, as after a calibration."""
     robot, rng = load_robot("panda"), np.random.default_rng(5)
     model = robot.model.copy()
     for joint in range(2, 8):
@@ -58,7 +56,7 @@ def configurations(robot: Robot, count: int, seed: int) -> Array:
 
 
 def holding(sheets: list[BranchCover], q: Array, half: float, shift: float) -> list[float]:
-    """Largest side [rad] of each box that holds q (7,), for this half side of the parameter."""
+    """Largest sides [rad] of the boxes around q (7,), for the given half side of the parameter."""
     found = []
     for sheet in sheets:
         u = -q[0] if sheet.mirrored else q[6]

@@ -1,5 +1,6 @@
-"""Forms of arms are recognised in any convention of their files, and where axes meet or are
-parallel only nearly.
+"""Forms of arms are recognised in any convention of robot files.
+
+Axes may also be only nearly parallel or nearly meet.
 """
 
 from __future__ import annotations
@@ -82,7 +83,10 @@ def test_singular_configurations_are_found_in_every_drawing(axes: JointAxes) -> 
 
 
 def test_the_distance_to_reach_is_that_of_the_arm() -> None:
-    """A pose out of reach is as far from it in every drawing, and the nearest position is near."""
+    """The distance to reach is the same in every drawing of an arm.
+
+    Poses moved by slightly more than the distance are reached in some direction, others are not.
+    """
     rng, axes = np.random.default_rng(13), shifted(-0.05, 0.04)
     form, T = form_of(axes), flange(robot_of(axes), rng.uniform(-1, 1, 6))
     T[:3, 3] *= 1.5 / np.linalg.norm(T[:3, 3])
@@ -111,7 +115,7 @@ def _shifted(T: Array, by: Array) -> Array:
     return moved
 
 
-# deviation of each joint's frame, as of a factory calibration [m, rad]
+# deviation of the joints' frames, as of a factory calibration [m, rad]
 OFF = 1e-4
 
 
@@ -134,7 +138,10 @@ def test_every_configuration_of_a_calibrated_arm_is_found(robot: Robot, count: i
 
 
 def test_rounded_angles_are_no_hindrance() -> None:
-    """Quarter turns written as 1.5708: the axes are no longer parallel, and none meet."""
+    """Rounded angles do not prevent a solution.
+
+    With quarter turns written as 1.5708, no axes are parallel or meet.
+    """
     model = KUKA.model.copy()
     for j in range(1, 7):
         M = model.jointPlacements[j]
@@ -150,7 +157,10 @@ def test_rounded_angles_are_no_hindrance() -> None:
 
 @pytest.mark.parametrize("off", [0.0, 1e-4, 1e-3])
 def test_a_calibrated_wrist_has_no_self_motion_but_single_configurations(off: float) -> None:
-    """At poses with an aligned nominal wrist, they lie along the curve of its self-motion."""
+    """A calibrated wrist has single configurations in place of a self-motion.
+
+    At poses with an aligned nominal wrist, these lie along the curve of the nominal self-motion.
+    """
     arm, rng = calibrated(KUKA, OFF), np.random.default_rng(23)
     for _ in range(4):
         q = inside(arm, rng)

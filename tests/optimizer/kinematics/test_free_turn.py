@@ -21,8 +21,8 @@ from tests.optimizer.kinematics.seven_joints import (
 )
 from tests.selection import long_but
 
-# uncertainty of angles next to a singularity, times the distance from it, of a pose rounded to
-# double precision [rad²]; larger for the xArm, whose elbow may be nearly folded, too
+# uncertainty of angles next to a singularity times the distance from it, for a pose rounded to
+# double precision [rad²]; larger for the xArm, due to a nearly folded elbow
 ROUNDED = {"panda": 1e-14, "iiwa14": 1e-14, "xarm7": 3e-14}
 # configurations [rad] beside a singularity and slightly off every curve; the first arm is stretched
 # up to 5.7e-6 rad
@@ -67,8 +67,9 @@ def arm(robot: Robot) -> RedundantArm:
 def test_a_pose_on_a_singularity_or_next_to_it_is_reached(
     robot: Robot, arm: RedundantArm, joint: int, off: float
 ) -> None:
-    """Curves meet with the third axis in line with the first, with a stretched arm and with an
-    aligned wrist.
+    """The solver reaches poses on a singularity and next to it.
+
+    The first and third axis are in line, the arm is stretched, or the wrist is aligned.
     """
     for q in configurations(robot, 5, seed=47):
         q[joint] = np.clip(off, robot.limits.q_min[joint], robot.limits.q_max[joint])
@@ -94,8 +95,9 @@ def test_a_pose_on_a_singularity_or_next_to_it_is_reached(
     ("joint", "step"), [(1, [1.0, 0, -1.0, 0, 0, 0, 0]), (3, [0, 0, 1.0, 0, -1.0, 0, 0])]
 )
 def test_a_free_turn_on_a_singularity_is_a_curve(joint: int, step: list[float]) -> None:
-    """With the first and the third axis in line, and the third and the fifth of a stretched
-    iiwa.
+    """The free turn of a singular arm is a self-motion.
+
+    The first and the third axis are in line, or the third and the fifth of a stretched iiwa.
     """
     rng = np.random.default_rng(51)
     for name in ("iiwa14", "panda") if joint == 1 else ("iiwa14",):

@@ -21,7 +21,7 @@ REACHED = 1e-9
 ASIDE = 0.03
 # largest distance of the projection, relative to the displacement
 FARTHER = 4.0
-# smallest share of arbitrary configurations that the motion leads back onto the manifold
+# smallest share of arbitrary configurations returned to the manifold by the projection
 MOSTLY = 0.9
 # relative tolerance of a minimum: quadratic steps end next to a corner of a sum of distances
 FLAT = 0.02
@@ -29,9 +29,7 @@ ROBOTS = ("panda", "xarm7", "gen3", "ur5e")
 
 
 def poses(arm: Arm, q: Array) -> list[ConeOrientedPose]:
-    """Poses that q (nq,) reaches: turned about an axis, within a cone, on the edge of a cone, of
-    any orientation.
-    """
+    """Goal poses around q (nq,): turned about an axis, in or on the edge of a cone, or free."""
     T, axis = tcp_pose(arm, q), np.array([0.3, -0.2, 1.0])
     pointing = T[:3, :3] @ axis / np.linalg.norm(axis)
     across = np.cross(pointing, [1.0, 0.0, 0.0])
@@ -60,7 +58,7 @@ def inner(arm: Arm, rng: np.random.Generator) -> Array:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_configurations_near_the_manifold_are_projected_nearby(name: str) -> None:
-    """A first-order proposal must not be projected onto a distant member of the self-motion."""
+    """A first-order proposal is projected nearby, not onto a distant member of the self-motion."""
     arm, rng = Arm(robot=load_robot(name)), np.random.default_rng(5)
     for q in [inner(arm, rng) for _ in range(5)]:
         for pose in poses(arm, q):
@@ -73,7 +71,10 @@ def test_configurations_near_the_manifold_are_projected_nearby(name: str) -> Non
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_successful_projections_reach_the_pose_within_the_limits(name: str) -> None:
-    """From arbitrary configurations, including singular ones and those on limits."""
+    """Projections from arbitrary configurations reach the pose, or report a failure.
+
+    The configurations include singular ones, and some on limits.
+    """
     arm, rng = Arm(robot=load_robot(name)), np.random.default_rng(6)
     limits = arm.active_limits
     anywhere = rng.uniform(limits.q_min, limits.q_max, (40, arm.robot.nq))
@@ -110,9 +111,7 @@ def test_the_distance_is_locally_smallest(name: str) -> None:
 
 
 def test_other_joints_take_over_from_a_joint_on_its_limit() -> None:
-    """One joint's range ends halfway: it stays on its limit, and the other joints still
-    approach.
-    """
+    """If a joint reaches its limit halfway, it stays there and the other joints still approach."""
     arm, weights = Arm(robot=load_robot("panda")), np.ones(7)
     q = np.array([0.2, 0.3, -0.1, -1.8, 0.2, 1.9, 0.4])
     pose, to = poses(arm, q)[0], q + np.array([0.6, 0.2, 0.4, -0.2, 0.5, 0.0, -0.5])

@@ -38,7 +38,7 @@ from tests.optimizer.kinematics.flange import (
 )
 from tests.optimizer.moves import ROBOT
 
-# smallest singular value, with metres and radians mixed, below which two singularities coincide
+# smallest singular value of two coinciding singularities, with metres and radians mixed
 DOUBLE = 6e-8
 # movement along the direction lost at a fold [rad]; it changes the pose by the square, about 1e-6 m
 BESIDE = 1e-3
@@ -71,7 +71,7 @@ def test_configurations_inside_the_limits(count: int) -> None:
             [[list(first).index(solution.label) for solution in solutions], turns.round()]
         )
         assert len(np.unique(keys, axis=0)) == len(solutions)
-        # Solutions of two labels are different configurations, and each reaches the pose.
+        # Solutions with different labels are different, and all solutions reach the pose.
         branches = joints(list(first.values()))
         apart = np.abs(np.exp(1j * branches[:, None]) - np.exp(1j * branches[None])).max(axis=2)
         assert (apart + np.eye(len(branches))).min() > FOUND
@@ -80,8 +80,9 @@ def test_configurations_inside_the_limits(count: int) -> None:
 
 
 def is_nearest_at_the_edge(T: Array, q: Array) -> bool:
-    """Whether the pose is out of reach by no more than `Reach` allows, and the searches that start
-    on both sides of the fold at q find no configuration nearer to the pose.
+    """Whether the pose is out of reach only within the tolerance of `Reach`.
+
+    Searches from both sides of the fold at q then find no configuration nearer to the pose.
     """
     error = max(errors(T, q))
     least = np.linalg.svd(jacobian(q))[2][-1]
@@ -148,8 +149,9 @@ def test_everyday_posture_has_the_everyday_label() -> None:
 
 
 def test_labels_say_where_the_elbow_and_the_arm_are() -> None:
-    """Height of the elbow and side of the offset, from frames alone, for arms that reach well
-    ahead.
+    """Labels agree with the height of the elbow and the side of the offset, computed from frames.
+
+    The arms reach well ahead.
     """
     checked = 0
     for q in np.random.default_rng(3).uniform(-np.pi, np.pi, (500, 6)):

@@ -110,8 +110,9 @@ def test_any_finite_pose_is_answered(far: float) -> None:
 
 
 def test_an_arm_folded_onto_its_own_axis_is_no_isolated_solution() -> None:
-    """Links of equal length put the fourth axis on the second: the arm turns about it, at every
-    q2.
+    """An arm with its fourth axis on the second turns freely about it, at any q2.
+
+    Links of equal length put the two axes in line.
     """
     model = ROBOT.model.copy()
     model.jointPlacements[4].translation = np.array([-0.425, 0.0, 0.1333])

@@ -1,6 +1,4 @@
-"""Configurations along a path of the TCP until the deadline, which keeps the points found
-before.
-"""
+"""Configurations along a path of the TCP; at the deadline, the points found so far are kept."""
 
 from __future__ import annotations
 
@@ -37,7 +35,7 @@ def test_what_was_found_before_the_deadline_is_kept() -> None:
         np.testing.assert_array_equal(one.q, other.q)
     for wanted, point in zip(LINE[5:], cut[5:], strict=True):
         assert not point.reached and not point.written
-        # The start of the search that was not made, with its errors.
+        # the point of a skipped search equals its start, with the error of the start
         np.testing.assert_array_equal(point.q, cut[4].q)
         distance = np.linalg.norm(tcp_pose(ARM, point.q)[:3, 3] - wanted)
         assert point.position_error == pytest.approx(distance, abs=1e-12)

@@ -92,8 +92,9 @@ def test_configurations_of_the_pose_stay_in_their_box(
 
 
 def test_small_boxes_shrink_onto_the_configurations_of_the_pose() -> None:
-    """One angle is free about an axis through the TCP: if it is known, narrowing determines the
-    other joints.
+    """Small boxes shrink onto the configurations of a pose with a free turn about an axis.
+
+    At a known angle of the turn, narrowing determines the other joints.
     """
     rng, arm = np.random.default_rng(3), Arm(robot=ROBOT)
     q = HOME + rng.uniform(-0.3, 0.3, 6)

@@ -111,7 +111,7 @@ def newton(robot: Robot, T: Array, q: Array) -> Array | None:
 
 
 def test_solutions_of_newtons_method_are_on_a_curve(robot: Robot, arm: RedundantArm) -> None:
-    """From random starts, without limits: no curve is missed."""
+    """All solutions of Newton's method, from random starts and without limits, are on a curve."""
     rng, found = np.random.default_rng(43), 0
     for q in configurations(robot, 5):
         T = flange(robot, q)
@@ -192,7 +192,10 @@ def test_arcs_are_the_parts_within_the_limits(robot: Robot, arm: RedundantArm) -
 
 
 def test_a_curve_with_a_short_part_within_the_limits_gives_a_member() -> None:
-    """The last joint is on its limit, and both ends of the arc are beyond limits."""
+    """A curve has a member even if only a short part in the middle of an arc is within limits.
+
+    The last joint is on its limit.
+    """
     panda = load_robot("panda")
     q = np.array(
         [
@@ -214,7 +217,7 @@ def test_a_curve_with_a_short_part_within_the_limits_gives_a_member() -> None:
 
 
 def test_poses_out_of_reach_say_by_how_much(robot: Robot) -> None:
-    """A pose shifted by less than this distance, in any direction, is still out of reach."""
+    """No pose closer than the reported distance, in any direction, is in reach."""
     inverse = required_inverse_kinematics(robot, "goal")
     T = np.eye(4)
     T[:3, 3] = [0.0, 0.0, 2.0]

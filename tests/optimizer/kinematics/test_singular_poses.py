@@ -72,15 +72,16 @@ def test_a_singular_elbow_is_a_solution_like_any_other(q: Array, elbow: float) -
 
 
 def test_next_to_three_singularities_at_once_a_pose_is_answered() -> None:
-    """Stretched elbow, nearly singular shoulder and wrist: rounding carries the arm out of
-    reach.
+    """Poses next to three singularities at once have accurate solutions.
+
+    The elbow is stretched, and shoulder and wrist are nearly singular: rounding moves the pose out
+    of reach.
     """
     rng, answered = np.random.default_rng(0), 0
     while answered < 150:
         q = rng.uniform(-2 * np.pi, 2 * np.pi, 6)
         q[2], q[4] = rng.choice([0, np.pi, -np.pi]), 10 ** rng.uniform(-4, -1) * rng.choice([-1, 1])
-        # Lift angles at which the last axis is between a micrometre and a decimetre from the first
-        # one.
+        # lift angles with a distance of a micrometre to a decimetre between the first and last axis
         lifts = np.linspace(-3, 3, 41)
         ahead = [FORM.ahead(np.array([q[0], lift, *q[2:]])) for lift in lifts]
         crossings = [k for k in range(40) if ahead[k] * ahead[k + 1] < 0]
@@ -99,8 +100,9 @@ def test_next_to_three_singularities_at_once_a_pose_is_answered() -> None:
 
 
 def test_an_edge_of_the_elbow_next_to_a_stretched_wrist_is_in_reach() -> None:
-    """The rounding of such a pose turns the fifth axis, and might carry the fourth out of the
-    elbow's reach.
+    """A pose at the edge of the elbow with a stretched wrist is in reach.
+
+    Rounding turns the fifth axis, and might move the fourth axis out of reach.
     """
     rng = np.random.default_rng(1)
     for _ in range(500):
@@ -123,7 +125,7 @@ def test_on_an_edge_the_branches_that_meet_count_once() -> None:
 
 
 def test_a_singular_shoulder_is_a_solution_like_any_other() -> None:
-    """With the last axis beside the first, both shoulders are one."""
+    """With the last axis beside the first, both shoulder branches are one regular solution."""
     rng = np.random.default_rng(8)
     for q in rng.uniform(-3, 3, (200, 6)):
         # The last axis' origin is level with the first axis: a2 c2 + a3 c23 + d5 s234 = 0, solved
@@ -194,7 +196,7 @@ def test_upright_all_singularities_meet_in_one_configuration() -> None:
 
 
 def test_the_curve_and_the_isolated_solutions_beside_it_agree() -> None:
-    """Just beyond the tolerance a pose has two isolated solutions, both next to the curve."""
+    """Just beyond the tolerance, two isolated solutions are near the curve of the singular pose."""
     for bend in (1e-9, 1e-8, 1e-6):
         q = np.array([0.4, -1.3, 1.5, 0.5, bend, 0.3])
         solutions = IK.solve(forward(q), windings=False)

@@ -27,7 +27,7 @@ WRIST = SphericalWrist.of(JointAxes.of(Chain.of(KUKA.model))) or pytest.fail(
 # joint error of a pose rounded by 1e-16, times the smallest singular value; larger for the product
 # of seven rounded matrices
 ROUNDING = 4e-15
-# distance from a fold within which both branches count as one [rad]
+# distance from a fold at which both branches count as one [rad]
 ON_A_FOLD = 5e-7
 
 
@@ -70,7 +70,7 @@ def test_every_configuration_is_found_once(count: int) -> None:
 def test_regular_poses_have_the_same_solutions_by_the_general_method(
     off: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """On both sides of the threshold between the regular solution and the general one."""
+    """The regular and the general method agree on both sides of the threshold between them."""
     rng, folded = np.random.default_rng(8), stretched()
     starts = [inside(KUKA, rng) for _ in range(30)]
     for k, q in enumerate(starts):
@@ -166,7 +166,10 @@ def test_next_to_the_first_axis(off: float) -> None:
 
 
 def test_a_wrist_on_the_first_axis_is_refused() -> None:
-    """The first axis turns and the wrist compensates: a self-motion of unknown form."""
+    """A wrist on the first axis has a self-motion of unknown form and is refused.
+
+    The first axis turns and the wrist compensates.
+    """
     rng = np.random.default_rng(16)
     for _ in range(20):
         with pytest.raises(SingularPose, match="start"):
@@ -174,7 +177,10 @@ def test_a_wrist_on_the_first_axis_is_refused() -> None:
 
 
 def test_a_label_changes_only_across_its_singularity() -> None:
-    """Along random paths; a change of the shoulder changes the elbow, too."""
+    """Along random paths, labels change only at singularities.
+
+    A change of the shoulder also changes the elbow.
+    """
     rng = np.random.default_rng(17)
     changes = 0
     for _ in range(100):
@@ -193,7 +199,7 @@ def test_a_label_changes_only_across_its_singularity() -> None:
 
 
 def test_parts_of_the_label_are_where_the_jacobian_is_singular() -> None:
-    """The determinant of a decoupled arm is a constant times the product of the three measures."""
+    """The determinant of the Jacobian is a constant times the product of the label measures."""
     rng, ratios = np.random.default_rng(18), []
     model, data = KUKA.model, KUKA.model.createData()
     for _ in range(50):
@@ -205,7 +211,7 @@ def test_parts_of_the_label_are_where_the_jacobian_is_singular() -> None:
 
 
 def test_the_everyday_posture_has_the_everyday_names() -> None:
-    """Reaching forward with the elbow above the line from shoulder to wrist."""
+    """A forward reach with the elbow above the line from shoulder to wrist has the usual names."""
     q = np.array([0.2, -1.2, 1.6, 0.1, 0.6, 0.3])
     assert str(IK.label(q)).startswith("right/up")
     chosen = [
@@ -217,9 +223,7 @@ def test_the_everyday_posture_has_the_everyday_names() -> None:
 
 
 def test_the_distance_out_of_reach_is_that_of_the_wrist() -> None:
-    """Shifted towards the second axis by less than the distance, the pose is out of reach; by more,
-    it is reached.
-    """
+    """The distance out of reach is the least shift towards the second axis to reach the pose."""
     T = np.eye(4)
     for position in ([1.6, 0.3, 0.5], [0.2, 0.1, 2.0], [-0.7, 0.9, -0.6]):
         T[:3, 3] = position
@@ -243,7 +247,10 @@ def test_the_distance_out_of_reach_is_that_of_the_wrist() -> None:
 def test_next_to_two_singularities_solutions_are_as_accurate_as_the_pose(
     other: str, off: float
 ) -> None:
-    """A nearly aligned wrist, too, is as accurate as a pose in double precision allows."""
+    """Near two singularities, solutions are as accurate as double precision of the pose allows.
+
+    One of the singularities is a nearly aligned wrist.
+    """
     rng, edge = np.random.default_rng(19), stretched()
     for _ in range(20):
         q = inside(KUKA, rng)
@@ -264,7 +271,10 @@ def test_next_to_two_singularities_solutions_are_as_accurate_as_the_pose(
 @pytest.mark.parametrize("off", [0.0, 1e-9, 1e-7, 1e-6])
 @pytest.mark.parametrize("parts", ["elbow wrist", "shoulder wrist", "elbow shoulder"])
 def test_on_two_singularities_at_once_no_branch_is_lost_in_silence(parts: str, off: float) -> None:
-    """The formulas for a single singularity lose branches there."""
+    """At two singularities at once, the solver raises an error.
+
+    The formulas for a single singularity lose branches there.
+    """
     rng = np.random.default_rng(8)
     for _ in range(10):
         q = inside(KUKA, rng)

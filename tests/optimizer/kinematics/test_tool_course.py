@@ -21,7 +21,7 @@ from tests.optimizer.tool_paths import HOME, along, moved
 
 
 def test_the_certificate_refuses_what_leaves_the_path() -> None:
-    """The straight line in joint space between the same ends is another curve of the tool."""
+    """The certificate refuses the straight line in joint space, another curve of the tool."""
     problem = along(moved([0.0, 0.5, 0.0]))
     q_goal = optimize(problem).goal.q
     spline = quintic_spline(HOME, q_goal, 2.0)
@@ -59,7 +59,7 @@ def test_a_deviation_is_seen_for_what_it_is() -> None:
 
 
 def test_an_excursion_of_the_path_cannot_be_left_out() -> None:
-    """A needle of 10 mm to the side, on a long path."""
+    """A motion must not skip a needle of 10 mm to the side of a long path."""
     foot, tip, back = moved([0.0, 0.15, 0.0]), moved([0.01, 0.15, 0.0]), moved([0.0, 0.1501, 0.0])
     for tolerance in (1e-4, 4e-3):
         path = ToolPath(via=[foot, tip, back], blend=tolerance, position_tolerance=tolerance)

@@ -28,7 +28,7 @@ ROUNDING = 1e-13
 # smallest share of the members of a closed form on the curves found; some of a pose next to a
 # singularity are missed
 COVERED = 0.99
-# configurations at which the curve of their pose bends by a right angle [rad]
+# configurations at right-angled bends of the curve of their pose [rad]
 BENT_CURVES = (
     np.array(
         [
@@ -53,7 +53,7 @@ BENT_CURVES = (
         ]
     ),
 )
-# configuration on a curve that nearly meets another one [rad]
+# configuration on a curve close to another curve [rad]
 BESIDE_ANOTHER = np.array(
     [
         1.7421639313669246,
@@ -109,7 +109,7 @@ def test_members_reach_the_pose_within_the_limits(robot: Robot, arm: TracedArm) 
 
 
 def test_a_configuration_on_a_limit_is_on_an_arc(robot: Robot, arm: TracedArm) -> None:
-    """Its curve leaves the limits there."""
+    """A configuration on a limit is on an arc, even if its curve leaves the limits there."""
     rng, limits = np.random.default_rng(56), robot.limits
     for joint in range(7):
         q = inside(robot, rng)
@@ -118,7 +118,10 @@ def test_a_configuration_on_a_limit_is_on_an_arc(robot: Robot, arm: TracedArm) -
 
 
 def test_parts_of_curves_between_starts_make_loops_and_open_paths() -> None:
-    """Start 4 is the same as 0; 5 and 6 lead to a start from which the curve ends."""
+    """Parts of curves between starts form loops and open paths.
+
+    Starts 0 and 4 have the same successor; starts 5 and 6 lead to a start with an open end.
+    """
     loops, paths = cycles([1, 2, 0, 3, 1, 7, 7, -1])
     assert sorted(map(sorted, loops)) == [[0, 1, 2], [3]]
     assert paths in ([[5, 7]], [[6, 7]])
@@ -190,7 +193,7 @@ def test_boxes_hold_the_curve(robot: Robot, arm: TracedArm) -> None:
 
 
 def test_no_curve_of_a_closed_form_is_missing() -> None:
-    """The Panda's closed form, which knows all curves, gives no seeds here."""
+    """Without the Panda's closed form, tracing finds nearly all members of its curves."""
     exact, chain = RedundantArm.of(PANDA.model), Chain.of(PANDA.model)
     traced = TracedArm(chain, SeedTable(chain, PANDA.limits.q_min, PANDA.limits.q_max), None)
     assert exact is not None
@@ -208,7 +211,10 @@ def test_no_curve_of_a_closed_form_is_missing() -> None:
 
 @pytest.mark.long
 def test_most_nearly_straight_arms_are_found() -> None:
-    """The elbow of the first one was once missed, and its pose refused."""
+    """The solver finds nearly straight arms, with at most one miss among twelve.
+
+    The first one is a regression: its elbow was missed and its pose refused.
+    """
     arm, rng = TracedArm.of(GEN3.model), np.random.default_rng(3)
     assert arm is not None
     missed = 0
@@ -228,7 +234,10 @@ def test_most_nearly_straight_arms_are_found() -> None:
 
 
 def test_a_curve_that_bends_within_a_thousandth_goes_on() -> None:
-    """The curves of two nearly straight arms ended there once, 1e-4 before these configurations."""
+    """A curve with a bend within a thousandth of a radian is traced past the bend.
+
+    The curves of two nearly straight arms used to end 1e-4 before these configurations.
+    """
     arm = TracedArm.of(GEN3.model)
     assert arm is not None
     for q in BENT_CURVES:
@@ -245,15 +254,17 @@ def test_out_of_reach_no_distance_is_claimed() -> None:
 
 
 def test_an_upright_arm_is_refused_as_singular() -> None:
-    """Four axes are in one line: the configurations are no curve."""
+    """An upright arm with four axes in one line is refused as singular."""
     with pytest.raises(SingularPose):
         required_inverse_kinematics(GEN3, "goal").solve(flange(GEN3, np.zeros(7)))
     assert str(required_inverse_kinematics(GEN3, "goal").label(np.zeros(7))) == "branch 1"
 
 
 def test_seeds_of_the_simple_arm_are_near_the_pose() -> None:
-    """From its flange, the Gen3 has a spherical shoulder up to 0.35 mm, and so has a calibrated
-    Panda from its base.
+    """Seeds from a nearby simple arm are near the pose.
+
+    Seen from the flange, the Gen3 has a spherical shoulder up to 0.35 mm; seen from the base, so
+    has a calibrated Panda.
     """
     rng, panda = np.random.default_rng(57), PANDA.model.copy()
     panda.jointPlacements[6].translation += np.array([1e-4, 2e-4, -1e-4])
@@ -271,7 +282,10 @@ def test_seeds_of_the_simple_arm_are_near_the_pose() -> None:
 
 
 def test_an_arm_stretched_beyond_the_reach_of_the_simple_arm_is_found() -> None:
-    """The simple arm has no curve there, and the seeds of the table led to other curves."""
+    """Poses beyond the reach of the simple arm are solved.
+
+    The simple arm has no curve there, and the seeds of the table lead to other curves.
+    """
     arm, T = TracedArm.of(GEN3.model), flange(GEN3, STRETCHED)
     nearby = NearbyArm.of(Chain.of(GEN3.model))
     assert arm is not None and nearby is not None and len(nearby.beside(T))
@@ -281,7 +295,10 @@ def test_an_arm_stretched_beyond_the_reach_of_the_simple_arm_is_found() -> None:
 
 @pytest.mark.parametrize("beside", [0.0, 1e-4, -1e-4])
 def test_a_curve_that_nearly_meets_another_one_is_found(beside: float) -> None:
-    """With few seeds, both were traced as one at the first configuration."""
+    """Two nearly meeting curves are separate.
+
+    With few seeds, tracing joined both curves at the first configuration.
+    """
     arm, q = TracedArm.of(GEN3.model), BESIDE_ANOTHER + beside
     assert arm is not None and not arm.complete
     curves = arm.self_motions(flange(GEN3, q), GEN3.limits)

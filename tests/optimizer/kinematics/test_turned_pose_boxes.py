@@ -42,7 +42,7 @@ def _singular(rng: np.random.Generator, kind: str) -> Array:
 @pytest.mark.parametrize("kind", ["any", "elbow", "wrist", "beside the wrist", "shoulder"])
 @pytest.mark.parametrize("robot", ARMS, ids=list(ARMS))
 def test_no_configuration_is_outside_the_boxes(robot: str, kind: str) -> None:
-    """For arbitrary tools and tool axes, and arms drawn in another convention."""
+    """The boxes contain all configurations, for any tool, tool axis and drawing of the arm."""
     for seed in range(6):
         rng = np.random.default_rng([seed, len(kind)])
         aligned = seed % 2 == 0

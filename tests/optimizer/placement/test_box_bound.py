@@ -68,7 +68,10 @@ def robots() -> dict[str, Robot]:
 @pytest.mark.parametrize("region", REGIONS)
 @pytest.mark.parametrize("robot", ["ur5e", "drawn"])
 def test_every_configuration_is_in_a_box(robot: str, region: str, base: np.ndarray) -> None:
-    """A yaw of an upright base turns the first joint alike at all stops: its travel is checked."""
+    """Every configuration is in a box, and its travel is covered.
+
+    A yaw of an upright base turns the first joint equally at all stops.
+    """
     if region == "mounted" and base is TILTED:
         pytest.skip("its mount is none of them")
     own_arm = Arm(robot=robots()[robot], T_flange_tcp=TOOL)

@@ -77,7 +77,7 @@ def test_what_is_in_the_world_stays_there() -> None:
 
 
 def test_a_world_that_turns_about_the_vertical_costs_the_same() -> None:
-    """Base, stops and obstacles turned together are the same cell."""
+    """A common turn of base, stops and obstacles about the vertical leaves the energy unchanged."""
     cycle = two_stops([floor()])
     turned = at(0.7, 0.3, 0.2, Rotation.from_euler("z", 0.8).as_matrix())
     world = cycle_at(cycle, np.linalg.inv(turned))

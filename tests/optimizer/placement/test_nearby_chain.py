@@ -40,7 +40,7 @@ def at_a_limit(robot: str) -> tuple[Arm, Array]:
 
 
 def nearby(arm: Arm, q: Array, shift: float) -> Cycle | None:
-    """The cycle at a base that is shifted along x."""
+    """The cycle at a base shifted along x."""
     pose, stop = Pose(tcp_pose(arm, q)), two_stops().stops[0]
     cycle = two_stops(arm=arm, start=pose, stops=[replace(stop, target=pose)])
     base = at(shift)

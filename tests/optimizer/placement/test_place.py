@@ -62,7 +62,7 @@ def check(found: PlacementSolution) -> None:
 
 @pytest.mark.long
 def test_brute_force_finds_no_better_place() -> None:
-    """On a line, against a cycle every two centimetres."""
+    """On a line, no place of a grid of two centimetres has a better cycle."""
     cycle = two_stops([floor()])
     found = place(cycle, Region(x=(-0.25, 0.15)), resolution=0.1, deadline=AMPLE, progress=False)
     check(found)

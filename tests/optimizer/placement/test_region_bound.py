@@ -96,7 +96,7 @@ def test_the_price_of_travel_is_the_least_over_speeds_and_joints() -> None:
 
 
 def test_mechanical_work_is_at_least_the_net_lift() -> None:
-    """The part is taken up at 0.1 m and put down at 0.4 m; the empty way back lifts nothing."""
+    """The work is at least the net lift from 0.1 m to 0.4 m; the empty way back lifts nothing."""
     stops = [
         Stop(name="pick", target=down(0.5, -0.3, 0.1), payload=PART),
         Stop(name="place", target=down(0.5, 0.3, 0.4), payload=Payload()),

@@ -1,4 +1,4 @@
-"""The places of a region, and requests that contradict themselves."""
+"""The places of a region, and errors for contradictory requests."""
 
 from __future__ import annotations
 

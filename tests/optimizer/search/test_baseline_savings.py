@@ -70,7 +70,7 @@ def compare(task: Problem, duration: float = DURATION, ours: float = 60.0) -> di
 
 
 def test_energies_balance() -> None:
-    """total = sum of parts for every baseline, with payload and tilted gravity."""
+    """The total of every baseline is the sum of its parts, with payload and tilted gravity."""
     payload = Payload(mass=3.0, com=np.array([0.0, 0.05, 0.1]), inertia=np.diag([0.01, 0.01, 0.01]))
     task = problem(payload=payload, gravity=np.array([3.0, -5.0, -7.9]))
     torques, potential, _ = oracle(task)
@@ -105,7 +105,7 @@ def test_report(objective: str) -> None:
 
 
 def test_the_straight_motion_keeps_every_rate_and_uses_one_up() -> None:
-    """Unscaled, one joint is at one of its limits, and all go the straight line in step."""
+    """The straight motion has one joint at one of its limits, and all joints move in step."""
     motion = straight(limits(), START, GOAL)
     way = GOAL - START
     share = (motion.q - START) / way
@@ -122,7 +122,10 @@ def test_the_straight_motion_keeps_every_rate_and_uses_one_up() -> None:
 
 
 def test_a_saving_is_claimed_in_the_same_time_against_what_keeps_every_limit() -> None:
-    """The shorter of two motions waits, held by the motors; with a dwell both have waited."""
+    """The shorter of two compared motions waits, and the waiting energy counts.
+
+    At the goal, the motors hold the arm during the wait.
+    """
     task = problem()
     torques, *_ = oracle(task)
     goal = standing(task.arm, GOAL, torques)
@@ -145,8 +148,9 @@ def test_a_saving_is_claimed_in_the_same_time_against_what_keeps_every_limit() -
 
 
 def test_savings_keep_their_sign() -> None:
-    """Regeneration may leave less than nothing to pay; a baseline of no duration has nothing to
-    save.
+    """A saving keeps its sign if regeneration makes an energy negative.
+
+    A baseline without duration has no energy to save.
     """
     assert saving(30.0, 60.0) == 0.5
     assert saving(-2.0, -1.0) == 1.0
@@ -155,9 +159,7 @@ def test_savings_keep_their_sign() -> None:
 
 
 def test_within_limits_in_time() -> None:
-    """A second and more is comfortable; in less than Ruckig's own time nothing is within the
-    limits.
-    """
+    """A second or more suits every limit; below Ruckig's own time, no baseline is feasible."""
     comfortable, hasty = compare(problem()), compare(problem(), duration=0.5)
     assert [name for name in NAMES if comfortable[name].within_limits] == [
         "quintic",
@@ -178,8 +180,9 @@ def test_within_limits_in_time() -> None:
 
 
 def test_within_limits_of_torque() -> None:
-    """Ruckig does not know torque: with a torque limit just below its peak it is out, just above it
-    is in.
+    """A torque limit just below the peak of Ruckig's motion excludes it, one just above does not.
+
+    Ruckig itself ignores torque.
     """
     free = problem()
     torques, *_ = oracle(free)
@@ -218,7 +221,7 @@ def test_no_travel() -> None:
 
 
 def test_next_to_no_travel() -> None:
-    """Down to rounding every figure stays finite."""
+    """Displacements as small as rounding errors give finite figures."""
     for displacement in (1e-6, 1e-9, 1e-12, 1e-15):
         goal = START + displacement
         for motion in guesses(problem(goal=goal), START, goal, DURATION).values():

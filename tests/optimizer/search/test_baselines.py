@@ -55,8 +55,9 @@ def one_joint(displacement: float) -> Array:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_motion_is_what_it_says(name: str) -> None:
-    """Ends, rest, weights; and over every panel the integrals of a and v are the changes of v and
-    q.
+    """Motions have the given ends, rest and weights, and consistent derivatives.
+
+    In every panel, the integrals of a and v are the changes of v and q.
     """
     motion = guesses(problem(), START, GOAL, DURATION)[name]  # type: ignore[index]
     assert motion.q[0] == pytest.approx(START, abs=EXACT)
@@ -116,9 +117,7 @@ def test_trapezoid_keeps_to_limits_where_it_can() -> None:
 
 
 def test_ruckig_keeps_its_limits_and_its_word() -> None:
-    """Over random moves and limits: no rate above its limit, the leading joint on one, and Ruckig's
-    own duration.
-    """
+    """Ruckig's motion keeps its limits and its duration, with the leading joint at a limit."""
     rng = np.random.default_rng(5)
     for _ in range(50):
         own = limits(
@@ -150,7 +149,7 @@ def test_ruckig_keeps_its_limits_and_its_word() -> None:
     ],
 )
 def test_controller_default_duration(displacement: float, duration: float) -> None:
-    """A move of one joint, from the UR's default 1.0472 rad/s and 1.3963 rad/s²."""
+    """A joint with the UR's default speed 1.0472 rad/s and acceleration 1.3963 rad/s²."""
     motion = controller_default(ROBOT.limits, ROBOT.default_motion, START, one_joint(displacement))
     assert motion.duration == pytest.approx(duration, rel=EXACT)
     assert motion.peak_a.max() == pytest.approx(1.3963, rel=EXACT)
@@ -158,8 +157,9 @@ def test_controller_default_duration(displacement: float, duration: float) -> No
 
 
 def test_controller_default_is_led_by_one_axis() -> None:
-    """The longest displacement sets the pace, the others keep in step on a straight line; tighter
-    limits count.
+    """The joint with the longest displacement sets the pace, and tighter limits count.
+
+    The other joints keep in step on a straight line.
     """
     displacement = np.abs(GOAL - START)
     motion = controller_default(ROBOT.limits, ROBOT.default_motion, START, GOAL)
@@ -172,7 +172,7 @@ def test_controller_default_is_led_by_one_axis() -> None:
 
 
 def test_nearest_goal() -> None:
-    """Least time at the speed limits first, then least displacement."""
+    """The nearest goal has the least time at the speed limits, then the least displacement."""
     near, turned = GOAL.copy(), GOAL.copy()
     turned[5] += 2 * math.pi
     assert nearest(problem(), START, np.array([turned, near])) == pytest.approx(near)

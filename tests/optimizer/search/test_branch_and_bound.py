@@ -130,7 +130,10 @@ def test_what_was_not_reached_says_so() -> None:
 def test_goals_that_seem_enclosed_are_tried_after_the_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A first attempt finds this one enclosed, and a path to another one."""
+    """Candidates with an enclosed goal are tried after all others.
+
+    The first attempt shows an enclosed goal; candidates with a known path come next.
+    """
     task = PreparedProblem.of(problem(goal=tcp_pose(GOAL)))
     found, tried = candidates(task.problem)[:4], list[Candidate]()
     search.bound(task, found)

@@ -117,8 +117,10 @@ def test_without_windings_every_branch_goes_the_shortest_way() -> None:
 
 
 def test_between_poses_relative_travels_are_distinct() -> None:
-    """Turning both ends alike changes nothing: of all pairs with the same displacement one is
-    kept."""
+    """Among pairs with the same displacement, one is kept.
+
+    The same full turn at both ends changes nothing.
+    """
     task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL))
     found = candidates(task)
     labels = {(candidate.start.label, candidate.goal.label) for candidate in found}

@@ -164,7 +164,10 @@ def test_they_reach_the_target_in_less_time(robot: str, free: bool) -> None:
 
 
 def test_few_samples_are_tried_also_where_many_are_open() -> None:
-    """Otherwise neighbours on one self-motion were searched for their fastest motions in turn."""
+    """Few samples get a fastest motion, even if many candidates are open.
+
+    Otherwise the search would compute the fastest motions of all neighbours on a self-motion.
+    """
     run = prepared(between_samples("panda", 0, free=False))
     candidates = run.state.candidates
     deferred = fastest_samples(candidates)

@@ -51,7 +51,7 @@ def rotations(seed: int, count: int) -> list[Array]:
 
 
 def test_samples_are_of_the_halton_sequence() -> None:
-    """Against SciPy's, by the cosine of the tilt: the first coordinate in base 2."""
+    """The samples equal SciPy's Halton sequence, with the cosine of the tilt in base 2."""
     R = sample_orientations(ConeOrientedPose(np.zeros(3)), 100)
     levels = qmc.Halton(3, scramble=False).random(100)[:, 0]
     assert R[:, 2, 2] == pytest.approx(1 - 2 * levels, abs=ROUNDING)
@@ -124,8 +124,9 @@ def test_leeway_is_the_derivative_of_forward_kinematics(pose: ConeOrientedPose) 
 
 
 def test_a_programme_with_its_goal_unknown_has_true_derivatives() -> None:
-    """Gradient and Hessian against central differences, the goal's row among the unknowns; the end
-    is at rest.
+    """Gradient and Hessian with a free goal agree with central differences.
+
+    The goal is among the unknowns, and the motion ends at rest.
     """
     task = PreparedProblem.of(problem(goal=GOAL))
     space, interval = bspline.uniform(9), duration_intervals(task, GOAL)[0]

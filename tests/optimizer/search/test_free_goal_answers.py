@@ -89,9 +89,7 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("condition", long_but(("tool and payload",), CONDITIONS))
 def test_holds_under(condition: str) -> None:
-    """Every other setting with a cone about a tool axis: in place, within the cone, above the
-    bound.
-    """
+    """Answers for a cone about a tool axis are in place, in the cone and above the bound."""
     given = {"payload": Payload(mass=0.5)} | CONDITIONS[condition]
     tool = given.get("T_flange_tcp", np.eye(4))
     T = tcp_pose(GOAL, tool).T

@@ -92,7 +92,7 @@ def test_others_are_explored_as_before(given: dict[str, Any]) -> None:
 
 
 def test_time_that_is_over_on_the_way() -> None:
-    """Nothing is lost: every candidate can still be solved, or counts as not reached."""
+    """If time runs out, every candidate is still open or reported as not reached."""
     own = run()
     own.state.end = Deadline.after(4.0, CountingClock(0.05))
     assert not explore_least_work(own.state, lambda: None)

@@ -38,7 +38,7 @@ PROBLEM = Problem(
 
 
 def with_one_motion(problem: Problem) -> SearchState:
-    """A search in which the quick posture of the largest estimate was solved alone."""
+    """A search with one solved candidate: the quick posture of the largest estimate."""
     state = SearchState.of(problem)
     stages.prepare(state)
     quick = [each for each in state.candidates if each.holdable and each.shortest < QUICK]
@@ -85,7 +85,7 @@ def test_several_separate_postures_of_every_curve_are_tried_the_quickest_first()
 
 @pytest.mark.parametrize("other", ["electrical", "no obstacles"])
 def test_nothing_else_is_explored(other: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither for electrical energy nor without obstacles."""
+    """The exploration does nothing for electrical energy, and nothing without obstacles."""
     problem = (
         replace(PROBLEM, objective="electrical")
         if other == "electrical"

@@ -134,7 +134,7 @@ def explored(**given: Any) -> SearchState:
 
 
 def test_as_good_as_the_best_of_many_starts() -> None:
-    """Mechanical work at a fixed duration, against the best of 16 starts on 40 control points."""
+    """The least work at a fixed duration matches the best of 16 starts on 40 control points."""
     task = Problem(
         arm=Arm(robot=ROBOT, collisions=False),
         start=BEST_START,
@@ -181,7 +181,7 @@ def test_nothing_is_solved_again_without_corners_or_even_spacing(given: dict[str
 
 
 def test_no_time_is_left() -> None:
-    """The motion stays as it is."""
+    """After the deadline, sharpening leaves the motion unchanged."""
     state = explored(objective="mechanical", duration_max=1.5)
     best = state.best()
     assert best is not None
@@ -237,7 +237,10 @@ def test_only_an_imprecise_cost_is_sharpened(
 
 
 def test_sharper_corners_bring_the_cost_near_the_exact_power() -> None:
-    """A slow joint against gravity: its friction and its power are close to their corners."""
+    """Sharper corners at least halve the error of the power.
+
+    A slow joint against gravity has its friction and its power close to their corners.
+    """
     run = prepared(descent())
     task, goal = run.state.prepared, run.state.candidates[0].q_goal
     (smooth,) = duration_intervals(task, goal)

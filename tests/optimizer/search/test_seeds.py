@@ -142,7 +142,10 @@ def downwards(name: str, high: list[float], low: list[float], bus: Bus) -> Probl
 
 
 def test_pairs_whose_lower_bounds_are_all_the_same_have_seeds_too() -> None:
-    """Gravity pays for everything: most pairs are bounded by zero."""
+    """Pairs with equal lower bounds have seeds too.
+
+    Gravity drives the motion, so the lower bound of most pairs is zero.
+    """
     run = prepared(
         downwards(
             "panda", [0, 0.2, 0, -0.6, 0, 0.8, 0.785], [0, 1.2, 0, -1.6, 0, 2.8, 0.785], Bus()
@@ -177,8 +180,10 @@ def test_motions_that_give_energy_back_have_seeds_too() -> None:
 
 
 def test_an_end_may_slide_onto_a_joint_limit() -> None:
-    """The sixth joint of this goal is on its limit: the samples beside it need some percent
-    more."""
+    """The goal may slide until a joint is on its limit.
+
+    The best goal has its sixth joint on the limit; samples beside it need some percent more.
+    """
     run = seeded("iiwa14", 4)
     answer = optimize(run.problem)
     limits = run.problem.arm.robot.limits

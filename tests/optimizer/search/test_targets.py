@@ -104,7 +104,10 @@ def test_a_motion_is_certified_against_its_own_target() -> None:
 
 @pytest.mark.parametrize("windings", [True, False])
 def test_more_pairs_than_can_be_named_are_refused(windings: bool) -> None:
-    """64 poses at both ends make millions; a pose and 64 poses still go without windings."""
+    """64 poses at both ends make millions of pairs, too many to report.
+
+    A list of 64 poses at one end is accepted without windings.
+    """
     poses = tuple(tcp_pose(GOAL + 0.001 * k) for k in range(64))
     with refusal_of("goal", match="fewer"):
         optimize(problem(AnyOf(poses), AnyOf(poses), windings=windings))
