@@ -1,4 +1,4 @@
-"""Planning problems of others: a file of one problem, its requests, and the table."""
+"""Published planning problems: a file of one problem, its requests, and the table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Planners of others: their motions, and runs in turns in processes of their own."""
+"""Other planners: their motions, and alternating runs in separate processes."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def test_a_triangle_between_two_capsules_is_not_held() -> None:
 
 
 def test_a_triangle_over_several_capsules_is_held() -> None:
-    """No capsule holds it alone."""
+    """No single capsule contains it."""
     row = [capsule([x, 0, 0], [x, 0.2, 0], 0.1) for x in (0.0, 0.15, 0.3)]
     across = triangles([[0, 0, 0], [0.3, 0, 0], [0.15, 0.2, 0.02]])
     assert all(len(not_held(across, [each])) for each in row)

@@ -34,7 +34,7 @@ def points_around(rng: np.random.Generator, count: int) -> Array:
 
 
 def test_distances_from_a_cube() -> None:
-    """From a face, an edge and a corner, and inside."""
+    """Distances from a face, an edge and a corner, and inside."""
     cube = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T.astype(float)
     points = np.array([[0.5, 0.4, 1.3], [1.3, 0.2, 1.4], [2, 2, 2], [0.5, 0.4, 0.7], [1, 1, 1]])
     assert from_hull(points, cube) == pytest.approx([0.3, 0.5, np.sqrt(3), -0.3, 0], abs=ROUNDING)

@@ -1,4 +1,4 @@
-"""The MJCF of a robot: MuJoCo's torques are those of the library."""
+"""The MJCF of a robot: MuJoCo and the library compute equal torques."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def torques(model: mujoco.MjModel, q: Array, v: Array, a: Array) -> Array:
 
 
 def test_torques_are_those_of_links_rotors_and_viscous_friction(arm: Robot) -> None:
-    """By MuJoCo's inverse dynamics and Pinocchio's, at random states."""
+    """MuJoCo's and Pinocchio's inverse dynamics agree at random states."""
     model, rng = mujoco.MjModel.from_xml_string(mjcf(arm)), np.random.default_rng(7)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     limits, own = arm.limits, arm.model.copy()

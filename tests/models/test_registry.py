@@ -275,7 +275,7 @@ def test_kinematics_and_limits_are_those_of_a_urdf_of_others(name: str) -> None:
 
 
 def test_a_folder_with_figures_is_a_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """No code names a robot: a second folder beside the first is found and loaded."""
+    """No code names a robot: a second folder with figures is found and loaded."""
     for name in ("ur5e", "other"):
         shutil.copytree(Path(registry.__file__).parent / "ur5e", tmp_path / name)
     (tmp_path / "no_robot").mkdir()
@@ -336,8 +336,8 @@ def test_a_robot_may_have_no_default_motion() -> None:
 
 
 def test_the_kuka_stands_on_its_base_with_its_first_axis_down() -> None:
-    """As its maker counts: from above, a positive turn is clockwise. At zero it reaches forward, at
-    its full length.
+    """The maker counts positive turns clockwise from above. At zero the arm reaches forward, at
+    full length.
     """
     robot = load_robot("kr10_r1100")
     assert robot.model.jointPlacements[1].rotation[:, 2] == pytest.approx([0, 0, -1], abs=ROUNDING)

@@ -43,7 +43,7 @@ def hulls(name: str) -> list[LinkHull]:
 
 
 def test_the_pads_of_the_robotiq_touch_when_closed_and_open_by_its_stroke() -> None:
-    """They move along y, stay upright, and the TCP is at the height of their middle when open."""
+    """The pads move along y and stay upright; the TCP is at the height of their middle if open."""
     tool = TOOL_MESHES[ROBOTIQ]
     pads = [
         swept
@@ -76,7 +76,7 @@ def test_arcs_stay_within_the_sagitta_of_their_chords() -> None:
 
 
 def test_a_triangle_is_not_held_where_no_cover_holds_its_whole_way() -> None:
-    """Two balls side by side hold the first and the last place, and neither holds the way."""
+    """Two balls side by side contain the first and the last place, but not the way between."""
     triangle = 1e-3 * np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
     aside = np.array([0.05, 0.0, 0.0])
     places = np.array([triangle - aside, triangle + aside])

@@ -16,7 +16,7 @@ from tests.compilers import with_compiler
 
 @pytest.fixture(scope="session", autouse=True)
 def _one_thread() -> Iterator[None]:
-    """As `optimize` has it: several threads cost small matrices more than they give."""
+    """One thread of linear algebra, as in `optimize`: more threads slow small matrices down."""
     with threadpool_limits(limits=1, user_api="blas"):
         yield
 

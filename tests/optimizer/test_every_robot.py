@@ -43,7 +43,7 @@ def test_every_configuration_is_among_those_of_its_pose(robot: Robot) -> None:
     for q in rng.uniform(robot.limits.q_min, robot.limits.q_max, (100, robot.nq)):
         T = flange(robot, q)
         solutions = inverse.solve(T, np.eye(4), robot.limits, True, "goal")
-        # of a curve, solutions are samples: the member nearest to q stands for it
+        # solutions on a curve are samples: the member nearest to q represents it
         curves = {
             id(each.self_motion): each.self_motion
             for each in solutions
@@ -86,7 +86,7 @@ def test_links_keep_apart_where_arms_are_used(name: str) -> None:
     assert model.signed_distances(np.array(EVERYDAY.get(name, EVERYDAY[robot.nq])))[0].min() > 0
 
 
-# 200 requests take some minutes, and more beside other work
+# 200 requests take some minutes, and more on a busy machine
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("count", long_but((4,), (4, 200)))
 def test_poses_are_answered_with_a_proof(robot: Robot, count: int) -> None:

@@ -98,7 +98,7 @@ def test_a_path_out_of_the_plane_of_the_joints_names_what_is_possible(arm: Arm) 
 
 
 def test_a_full_pose_that_the_arm_holds(arm: Arm) -> None:
-    """As a palletiser or a desk arm shows it, in micrometres."""
+    """The position is rounded, as on the display of a palletiser or desk arm."""
     T = tcp_pose(arm, THERE)
     T[:3, 3] = T[:3, 3].round(7)
     found = inverse_kinematics(arm, Pose(T))

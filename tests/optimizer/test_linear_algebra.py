@@ -58,7 +58,7 @@ def test_contexts_may_be_nested() -> None:
 
 
 def test_a_thread_other_than_the_first_to_ask_is_limited() -> None:
-    """Here the main thread set a number first, and still holds it."""
+    """The main thread was the first to set a number, and its limit is still in force."""
     neighbour = Neighbour()
     assert neighbour.seen == {1}
     neighbour.leave()

@@ -55,7 +55,7 @@ def by_hand(task: Any, q: Array, v: Array, a: Array) -> Array:
 
 
 def test_the_law_takes_what_the_links_ask_for() -> None:
-    """Not the rotor: its torque does not pass through the gear."""
+    """The rotor's torque is left out: it does not pass through the gear."""
     task = problem(robot=loaded(), payload=PAYLOAD, gravity=TILTED)
     y = states(21)
     q, v, a = y[:, :6], y[:, 6:12], y[:, 12:]
@@ -88,7 +88,7 @@ def test_a_load_of_zero_is_no_load() -> None:
 
 @pytest.mark.parametrize("side", ["motor", "link"])
 def test_the_kernels_cost_and_its_derivatives(side: Any) -> None:
-    """With corners as good as sharp the cost is the reported power; smoothed, derivatives are the
+    """With almost sharp corners the cost is the reported power; with smoothing, derivatives are the
     slopes.
     """
     robot = loaded(

@@ -66,7 +66,7 @@ def test_answers_are_true(name: str, method: str) -> None:
     ),
 )
 def test_mechanical_answers_are_true(name: str, method: str, duration: str) -> None:
-    """In 1.5 times the shortest duration, or in up to 1.2 times."""
+    """The duration is 1.5 times the shortest one, or at most 1.2 times."""
     given = CONDITIONS[name]
     least = shortest(**given)
     durations = fixed(1.5 * least) if duration == "fixed" else {"duration_max": 1.2 * least}
@@ -165,7 +165,7 @@ def test_windings_can_be_left_out() -> None:
 
 
 def test_the_branch_asked_for_is_taken() -> None:
-    """At both ends, at the price of a worse motion."""
+    """The requested branch is taken at both ends, even if the motion is worse."""
     best = solved(problem(start=tcp_pose(START), goal=tcp_pose(GOAL)))
     for wanted in (
         BranchFilter("left", "up", "no_flip"),
@@ -195,8 +195,8 @@ def test_pose_and_joints_agree() -> None:
 
 
 def test_a_tool_moves_the_goal_but_not_the_motion() -> None:
-    """A pose of the tool's tip, tool told, is the same request as the flange's pose without a
-    tool."""
+    """A pose of the tool's tip, with the tool given, is the same request as the flange's pose
+    without a tool."""
     tool = pin.SE3(pin.rpy.rpyToMatrix(0.4, -0.2, 1.0), np.array([0.05, 0.0, 0.15])).homogeneous
     bare = solved(problem(goal=tcp_pose(GOAL)))
     tipped = solved(problem(goal=tcp_pose(GOAL, tool), T_flange_tcp=tool))

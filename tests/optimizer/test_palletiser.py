@@ -1,4 +1,4 @@
-"""Requests about an arm with joints that follow others."""
+"""Requests for an arm with mechanically coupled joints."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ def test_the_length_of_a_stream_is_unknown(arm: joulepath.Arm) -> None:
 def test_a_replay_tells_its_simulations(
     problem: joulepath.Problem, solution: joulepath.Solution
 ) -> None:
-    """With payload unchanged, as there is none: two controllers, two arms, and the baselines on
+    """Without a payload there is no variant of it: two controllers, two arms, and the baselines on
     three.
     """
     perturb = {"payload": 0.1, "friction": 0.3}

@@ -53,7 +53,7 @@ LINES = {
 
 @pytest.mark.parametrize("name", long_but(("with a turn",), LINES))
 def test_the_tool_is_on_the_line(name: str) -> None:
-    """By the definition of a line, not by the course's own measure."""
+    """The definition of a line is the reference, independent of the course's own measure."""
     goal = moved(*LINES[name])
     found = optimize(along(goal))
     assert found.certificate.valid and found.lower_bound <= found.energy.electrical.total

@@ -23,7 +23,7 @@ from tests.refusals import refusal_of
 from tests.selection import long_but
 
 Z = (0.0, 0.0, 1.0)
-# a nozzle beside the flange: by turning about its own axis it moves the wrist aside
+# a nozzle offset from the flange: turning it about its own axis moves the wrist
 NOZZLE = Pose.from_rotation([0.15, 0.0, 0.1], np.eye(3)).T
 ARM = Arm(robot=ROBOT, T_flange_tcp=NOZZLE, collisions=False)
 
@@ -105,7 +105,9 @@ def test_it_never_needs_more_than_without_turns(seed: int) -> None:
 
 
 def test_a_turning_is_the_shortest_of_all_on_its_sheet() -> None:
-    """By brute force over short turnings; every step of it is a step of the sheet."""
+    """Brute force over short turnings is the reference; every step of the path is a step of the
+    sheet.
+    """
     problem = along(moved([0.0, 0.2, 0.0]), path=ToolPath(about=Z))
     course = PreparedProblem.of(problem).course
     assert course is not None

@@ -32,14 +32,16 @@ class Convention:
 
 
 def right_angled(nq: int, rng: np.random.Generator) -> Convention:
-    """As a designer draws it: zero positions and frames at quarter turns."""
+    """A designer's convention: zero positions and frames at quarter turns."""
     frames = [np.eye(3), *(_quarters(rng) for _ in range(nq))]
     zeros = rng.integers(-1, 3, nq) * np.pi / 2
     return Convention(rng.choice([-1.0, 1.0], nq), zeros, np.array(frames))
 
 
 def inclined(nq: int, rng: np.random.Generator) -> Convention:
-    """As `right_angled`, with the frames of every second link inclined by a multiple of 15°."""
+    """The convention of `right_angled`, with every second link's frames inclined by a multiple of
+    15°.
+    """
     designed = right_angled(nq, rng)
     angles = rng.integers(1, 24, nq + 1) * (np.arange(nq + 1) % 2) * np.pi / 12
     turns = [pin.exp3(angle * np.eye(3)[rng.integers(3)]) for angle in angles]

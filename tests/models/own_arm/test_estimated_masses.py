@@ -139,5 +139,5 @@ def test_the_nearest_possible_inertia() -> None:
         found = nearest_possible_inertia(wild + wild.T)
         least, middle, most = np.linalg.eigvalsh(found)
         assert least >= -1e-12 and most <= least + middle + 1e-12
-        # mending twice changes nothing more
+        # a second correction changes nothing
         assert nearest_possible_inertia(found) == pytest.approx(found, abs=1e-12)

@@ -1,4 +1,4 @@
-"""Figures of a URDF beside its chain: soft limits, friction, limits of URDF 1.2, a tilted base."""
+"""Figures of a URDF besides its chain: soft limits, friction, limits of URDF 1.2, a tilted base."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a URDF may lack or have beside an arm, and all of its problems in one answer."""
+"""A URDF may lack parts or contain more than an arm; one answer lists all of its problems."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_xacro_in_use_is_refused(used: str) -> None:
 
 
 def test_all_others_are_held_in_one_go() -> None:
-    """At zero, or at the limit nearest to it."""
+    """Every other joint is held at zero, or at its limit nearest to zero."""
     by_name = replace(GRIPPING, locked={"finger": 0.01, "opposite": 0.0})
     others = replace(GRIPPING, locked="others")
     assert own_figures("mine", others) == own_figures("mine", by_name)
@@ -85,7 +85,7 @@ def test_all_others_are_held_in_one_go() -> None:
 
 
 def test_a_mimic_joint_follows_the_joint_that_is_held() -> None:
-    """At multiplier · position + offset, unless it is named itself."""
+    """It is held at multiplier · position + offset, unless it is named itself."""
     mimic = '<mimic joint="finger" multiplier="0.5" offset="0.01"/>'
     gripping = replace(GRIPPING, urdf=GRIPPING.urdf.replace('<mimic joint="finger"/>', mimic))
     heavy = replace(gripping, urdf=gripping.urdf.replace('<link name="right"/>', HEAVY))

@@ -61,7 +61,7 @@ def volume(axis: Array, radius: float) -> float:
 
 @pytest.mark.parametrize("link", long_but((0, 2), range(7)))
 def test_a_capsule_holds_every_triangle_of_a_link(link: int) -> None:
-    """Of a real arm; and it is not much larger than it has to be: than 2.6 times the hull."""
+    """For a real arm, the capsule is at most 2.6 times as large as the hull."""
     surface = link_surfaces(arm_folder("ur5e"), "ur5e", link)["visual"]
     points = surface.reshape(-1, 3)
     axis, radius = capsule_around(points)
@@ -132,8 +132,8 @@ ALONE = NAMED[: NAMED.index(CYLINDER)] + NAMED[NAMED.index("<collision><geometry
 
 
 def test_a_link_of_shapes_with_corners_has_hulls_of_them() -> None:
-    """Not a link with capsules of the user, with a ball, or without its mesh. The block has the
-    place of the mesh's origin in the URDF."""
+    """Links with capsules of the user, with a ball, or without a mesh have no hulls. The block is
+    at the mesh's origin in the URDF."""
     files = {"forearm.stl": stl(BLOCK)}
     asked = dataclasses.replace(RICH_ARM, urdf=ALONE, meshes=files)
     (hull,) = [each for each in robot(asked).hulls if each.link == 2]

@@ -321,7 +321,7 @@ def test_a_file_is_read(tmp_path: Path) -> None:
 
 
 def test_guessed_capsules_of_a_wrist_leave_most_configurations_valid() -> None:
-    """Of arms by their kinematics alone: capsules from joint to joint are too thick next to a
+    """For arms with kinematics alone, capsules from joint to joint are too thick next to a
     spherical wrist.
     """
     for name in ("kr10_r1100", "ur10e", "xarm7"):

@@ -99,7 +99,7 @@ def test_identified_figures_have_the_documents_covariance() -> None:
     assert own[k, k] == pytest.approx(0.09, rel=0.03)
     assert own[k, load] == pytest.approx(-0.001, rel=0.1)
     assert np.sqrt(session[k, k]) == pytest.approx(0.03 * robot.friction.coulomb[1], rel=0.03)
-    # the document tells the friction of joint 2, and the others have the default range
+    # the document states the friction of joint 2, and the others have the default range
     friction = np.sqrt(np.diag(spread.covariances["friction"])[place("coulomb", 6)])
     assert friction[1] == 0 and (np.delete(friction, 1) > 0.1).all() and spread.move_sd == 1.5
     # a figure without identification keeps its range

@@ -81,7 +81,9 @@ def test_pairs_that_may_be_near_are_left(seed: int, within: float) -> None:
 
 
 def test_a_normal_separates_at_both_configurations() -> None:
-    """It moves with the first body; the better of two normals counts, by its lesser separation."""
+    """The normal moves with the first body; of two normals, the larger of the lesser separations
+    counts.
+    """
     model, q = in_cell(1, 4)
     frames = model.frames(q)
     begin, pair = (index.ravel() for index in np.indices((len(q), len(model.pairs))))

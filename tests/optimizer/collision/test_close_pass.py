@@ -71,8 +71,8 @@ def test_distances_are_those_without_margins(margin: float) -> None:
 
 
 def test_a_margin_hides_no_other_pass() -> None:
-    """One ball touches its margin of 5 mm, another is 1 mm away and asks for nothing: the second
-    one is named.
+    """One ball touches its margin of 5 mm, another one without a margin is 1 mm away: the second is
+    named.
     """
     kept, free = on_the_axis(5e-3, 5e-3), on_the_axis(1e-3, 0.0)
     (wide,), (bare,) = kept.scene.obstacles, free.scene.obstacles
@@ -99,7 +99,7 @@ def folded_to(distance: float) -> Array:
 
 
 def test_the_arm_itself_is_passed_closely() -> None:
-    """To 1 mm before two links meet."""
+    """The arm is folded until two links are 1 mm apart."""
     folded = folded_to(1e-3)
     motion = quintic_spline(folded - np.array([0, 0, 0.3, 0, 0, 0]), folded, 1.0)
     arm = Arm(robot=ROBOT)

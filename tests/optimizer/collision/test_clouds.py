@@ -400,7 +400,7 @@ def test_the_margin_and_the_radius_are_kept() -> None:
 
 @pytest.mark.long
 def test_an_arm_that_starts_within_a_closed_mesh_collides() -> None:
-    """No surface is near: only the inside tells."""
+    """No surface is near: only the sign of the distance shows the collision."""
     room = np.array([6.0, 6.0, 6.0])
     within = problem_with(
         START, GOAL, scene=Scene([Obstacle("rock", TriangleMesh(box_triangles(room)))])

@@ -1,4 +1,4 @@
-"""Clouds are kept for the next request with the same obstacle, of so many parts in all."""
+"""Clouds are cached for later requests with the same obstacle, up to a total number of parts."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def test_obstacles_are_compared_with_hulls_and_clouds_with_capsules() -> None:
 
 
 def test_a_link_called_as_the_tool_is_compared_with_obstacles() -> None:
-    """By its capsules, beside the hulls of a gripper on it."""
+    """Its capsules are compared, in addition to the hulls of a gripper on it."""
     urdf = URDF.replace('"tool"', '"mounting"').replace('"forearm"', '"tool"')
     arm = robot(changed(urdf=urdf, tip="mounting"))
     gripper = load_tool("robotiq_2f_85").shape
@@ -66,8 +66,8 @@ def test_without_obstacles_there_are_no_hulls() -> None:
 
 
 def test_links_are_compared_by_hulls_if_the_robot_says_so() -> None:
-    """Also with the tool; links without hulls, as the base, by their capsules. A check of single
-    configurations agrees with the distances, and their gradients with differences.
+    """The tool is compared by hulls, too; links without hulls, such as the base, by their capsules.
+    Checks of single configurations agree with the distances, and gradients agree with differences.
     """
     rod = Attachment(Sphere(0.03), at(0.0, 0.0, 0.05))
     model = CollisionModel(Arm(robot=replace(ROBOT, hulls_between_links=True), tool=[rod]))
@@ -98,7 +98,7 @@ def test_links_are_compared_by_hulls_if_the_robot_says_so() -> None:
 
 
 def test_distances_are_those_of_the_meshes_or_a_little_less() -> None:
-    """Against the convex hulls of both of the maker's meshes of every link, by Coal."""
+    """Coal computes the reference: distances from the convex hulls of both meshes of every link."""
     model = CollisionModel(Arm(robot=ROBOT, scene=Scene([POST, BALL])))
     q = np.random.default_rng(2).uniform(-3, 3, (60, 6))
     frames = model.frames(q)

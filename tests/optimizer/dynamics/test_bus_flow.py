@@ -116,7 +116,7 @@ def test_the_store_keeps_its_limits(bus: Bus) -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_other_law_draws_less(seed: int) -> None:
-    """Against the linear programme over all ways to charge and discharge."""
+    """The reference is a linear programme over all schedules of charging and discharging."""
     joints, weights = course(seed)
     bus = Bus("storage", efficiency=0.85, capacity=7.0, power=150.0, initial=3.0)
     net = weights * (20.0 + joints.sum(axis=1))
@@ -160,7 +160,7 @@ def test_the_store_by_hand() -> None:
     "bus", [Bus(), Bus("isolated"), Bus("recuperating", efficiency=0.5), STORE], ids=str
 )
 def test_parts_add_up(name: str, bus: Bus) -> None:
-    """In the answer and in its certificate, and the answer is above its proven bound."""
+    """Parts add up in the answer and in its certificate; the answer is above its proven bound."""
     found = solved(name, bus)
     electrical = found.energy.electrical
     assert electrical.parts_sum == pytest.approx(
@@ -192,9 +192,7 @@ def test_what_shares_more_draws_less(name: str) -> None:
 
 
 def test_buses_make_a_difference() -> None:
-    """The moves above do have net power below zero: without it all modes would agree and the tests
-    see nothing.
-    """
+    """The moves have phases of negative net power: without them all modes would agree."""
     assert total("down", Bus("isolated")) > 1.5 * total("down", Bus())
     assert total("down", Bus("recuperating", efficiency=1.0)) < 0.9 * total("down", Bus())
     assert total("down", STORE) < 0.97 * total("down", Bus())
@@ -295,8 +293,8 @@ def test_bounds_hold_on_every_bus(name: str, bus: Bus) -> None:
 
 
 def test_inverter_figures_replace_the_robots() -> None:
-    """By hand: the added loss is constant · T + linear ∫|i| + quadratic ∫i², and the bound includes
-    the constant.
+    """By hand, the added loss is constant · T + linear ∫|i| + quadratic ∫i²; the bound includes its
+    constant part.
     """
     compile_kernel(ROBOT)
     plain, lossy = (

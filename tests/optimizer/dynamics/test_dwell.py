@@ -126,8 +126,8 @@ def test_no_duration_is_better(name: str) -> None:
 
 
 def test_braking_early_pays_where_holding_is_dear() -> None:
-    """With motors on, the wait costs as much as moving slowly; with brakes at 5 W it is worth
-    getting there.
+    """With motors on, waiting costs as much as slow motion; with brakes at 5 W, an early arrival
+    pays.
     """
     motors, brakes = solved(DWELLS["motors"]), solved(DWELLS["cheap brakes"])
     assert brakes.duration < 0.7 * motors.duration

@@ -122,7 +122,7 @@ def certain(spread: Spread) -> Spread:
 
 @pytest.mark.parametrize("name", CONDITIONS)
 def test_the_gradient_is_the_slope(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By every figure: the same motion with a little more and a little less of it."""
+    """For every figure, the reference is the same motion with a slightly changed value."""
     given = dict(CONDITIONS[name])
     # the figures of the request would hide the robot's
     inverter = given.pop("inverter", None)
@@ -165,7 +165,7 @@ def with_link(robot: Robot, part: str, joint: int, by: float) -> Robot:
 
 
 def masses(robot: Robot) -> list[float]:
-    """Of the moving links [kg]."""
+    """Masses of the moving links [kg]."""
     return [float(body.mass) for body in list(robot.model.inertias)[1:]]
 
 
@@ -203,7 +203,7 @@ def test_the_gradient_by_the_links_is_the_slope(name: str, monkeypatch: pytest.M
 
 
 def test_errors_of_the_links_widen_the_interval() -> None:
-    """By as much as other masses change the energy."""
+    """The interval widens by the energy changes of other link masses."""
     robot, spline = with_link_errors(ROBOT), quintic_spline(START, GOAL, 0.9)
     plain, task = (problem(payload=PAYLOAD, robot=each) for each in (ROBOT, robot))
     before, after = (
@@ -281,7 +281,7 @@ def test_what_the_request_gives_is_known() -> None:
 
 
 def test_a_replayed_motion_has_the_interval_of_its_answer() -> None:
-    """In one block, and in many."""
+    """The intervals agree for a replay of one block and of many."""
     found = optimize(problem(payload=PAYLOAD, sample_period=0.001))
     path, interval = found.trajectory, found.energy.electrical.interval
     assert interval is not None
@@ -409,7 +409,7 @@ def test_a_saving_keeps_what_each_motion_has_of_its_own() -> None:
 
 
 def test_the_guess_has_no_effect_on_another_law() -> None:
-    """The covariance of one law says nothing of another: its ranges are the defaults."""
+    """The covariance of one law does not apply to another: its ranges are the defaults."""
     robot = identified()
     own, other = spread_of(robot, "identified"), spread_of(robot, "curved")
     assert "friction" not in own.covariances and "friction" in other.covariances

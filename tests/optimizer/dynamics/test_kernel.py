@@ -82,8 +82,8 @@ def test_torques_are_pinocchios(compiled: Kernel, count: int) -> None:
 
 @pytest.mark.parametrize("kind", ["electrical", "mechanical", "time"])
 def test_costs_are_the_reported_powers(compiled: Kernel, kind: str) -> None:
-    """With corners as good as sharp: bus power, Σ |tau_j v_j|, or a price of time, from Pinocchio's
-    torques.
+    """With almost sharp corners, costs equal reported powers from Pinocchio's torques: bus power, Σ
+    |tau_j v_j|, or a price of time.
     """
     task, names = TASK.problem, list(Parameters.__dataclass_fields__)
     sharp = {"knee": task.arm.friction_law.knee, "width": 1e-9}

@@ -243,8 +243,8 @@ def test_a_damaged_library_is_noticed_and_rebuilt(
 def test_several_processes_make_one_library_of_each_robot(
     workshop: Workshop, names: list[str]
 ) -> None:
-    """Three at once into an empty folder: one compiles, the others wait for it, nothing is left
-    lying about.
+    """Of three concurrent builds into an empty folder, one compiles and the others wait; no
+    temporary files remain.
     """
     command = [
         sys.executable,
@@ -277,8 +277,8 @@ def test_what_a_killed_process_left_is_deleted(workshop: Workshop) -> None:
 
 @pytest.mark.long
 def test_a_short_script_with_an_empty_cache_ends_well(workshop: Workshop) -> None:
-    """It has its answer from the virtual machine and does not wait for the compiler, nor stumble
-    over it.
+    """The virtual machine computes the answer; the script neither waits for the compiler nor fails
+    because of it.
     """
     code = (
         "from joulepath import Arm, Problem, load_robot, optimize\n"
@@ -293,7 +293,7 @@ def test_a_short_script_with_an_empty_cache_ends_well(workshop: Workshop) -> Non
 def test_without_a_compiler_the_virtual_machine_serves(
     workshop: Workshop, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """And the answer is the same."""
+    """The answer is the same as with a compiler."""
     no_compiler(monkeypatch, tmp_path)
     assert compiler() is None
     with pytest.raises(RuntimeError, match="compiler"):

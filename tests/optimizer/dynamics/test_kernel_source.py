@@ -25,7 +25,7 @@ PARAMETERS = sizes(ROBOT.nq)["torque"][0][1]
 
 
 def library(functions: list[ca.Function], lanes: int, folder: Path) -> Path:
-    """The functions compiled for so many nodes at once, without optimisation; with the vectors of
+    """The functions compiled for `lanes` nodes at once, without optimisation, with the vectors of
     this processor.
     """
     code, target = folder / "kernel.c", folder / "kernel.so"

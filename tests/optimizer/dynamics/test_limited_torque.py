@@ -118,7 +118,7 @@ def test_a_limit_of_the_link_lets_the_motor_do_more(method: Any) -> None:
     at_joint = np.abs(at_link(tasks[0], path.q, path.v, path.a)).max(axis=0) / TIGHT.tau_max
     assert 0.95 < at_joint.max() <= 1 + 1e-6
     assert (np.abs(path.tau_motor).max(axis=0) > 1.05 * TIGHT.tau_max).any()
-    # whoever looks at the motion again says the same
+    # another evaluation of the motion agrees
     assert link.certificate.worst_ratio["torque"] == pytest.approx(at_joint.max(), abs=0.01)
     assert path.spline is not None
     ends = link.start.q, link.goal.q, link.energy

@@ -137,8 +137,8 @@ def test_constant_power_by_hand() -> None:
 
 @pytest.mark.parametrize(("regeneration", "drawn"), [(0.0, 0.0), (0.35, -35.0), (1.0, -100.0)])
 def test_surplus_is_burnt_or_returned(regeneration: float, drawn: float) -> None:
-    """Of 100 W too much the supply takes back the regenerated fraction; a demand of 100 W is always
-    drawn in full.
+    """Of a surplus of 100 W, the supply takes back the regenerated fraction; a demand of 100 W is
+    always drawn in full.
     """
     assert drawn_power(-100.0, regeneration) == pytest.approx(
         drawn, rel=HAND_TOLERANCE, abs=HAND_TOLERANCE
@@ -173,7 +173,7 @@ def test_smoothing_is_an_upper_bound_that_vanishes_with_its_width() -> None:
 
 
 def test_several_savings_are_each_one_by_itself() -> None:
-    """Of no energy, and of none at all, too."""
+    """Savings agree also for motions without any energy."""
     arm, rng = problem().arm, np.random.default_rng(5)
     known = [
         MotionEnergy(e, Sensitivity(rng.normal(size=count(6)), 0.1), 1.5) for e in (50.0, 60.0, 0.0)

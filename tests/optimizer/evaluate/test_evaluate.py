@@ -241,7 +241,7 @@ def test_energy_storage_keeps_its_charge_from_segment_to_segment() -> None:
 
 
 def test_without_a_store_there_is_no_charge() -> None:
-    """As in an answer of `optimize`."""
+    """The charge is absent, as in an answer of `optimize`."""
     samples = evaluate(ARM, motion("quintic"), sample_period=0.01).samples
     assert samples is not None and samples.charge is None
     assert optimize(problem()).trajectory.charge is None

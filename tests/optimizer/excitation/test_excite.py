@@ -1,4 +1,4 @@
-"""Excitations tell parameters apart, rest at their ends and keep their limits; gradients and
+"""Excitations separate parameters, rest at their ends and keep their limits; gradients and
 deviations are right.
 """
 
@@ -83,7 +83,7 @@ def test_limits_clearance_and_condition(found: Excitation) -> None:
     assert certificate.clearance is not None and certificate.clearance.min_clearance >= 0.02
     assert found.scaled_condition <= 60 < found.condition
     assert (found.starts, found.feasible) == (1, 1)
-    # the load of shoulder and elbow varies enough to tell its friction
+    # the load of shoulder and elbow varies enough to determine its friction
     assert [each.parameter for each in found.predicted_sd[40 + 18 :]] == ["load2", "load3"]
 
 
@@ -174,7 +174,7 @@ def test_no_room_is_said() -> None:
 
 
 def test_a_joint_that_is_nearly_locked_stays_within_its_range() -> None:
-    """Its figures are then as good as unknown, and the predicted deviations tell by how much."""
+    """The predicted deviations show that its figures are almost undetermined."""
     robot = load_robot("ur5e")
     locked = robot.limits.tightened(
         q_min=np.r_[-5e-4, robot.limits.q_min[1:]], q_max=np.r_[5e-4, robot.limits.q_max[1:]]

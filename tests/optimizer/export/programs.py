@@ -13,7 +13,7 @@ LOAD = Payload(1.5, np.array([0.0, 0.01, 0.06]))
 
 
 def cycle_with_payload(robot: str = "ur5e", label: str = "start to pick") -> Program:
-    """To a grasp, a dwell, a move with the payload, and back without it."""
+    """A move to a grasp, a dwell, a move with the payload, and a return without it."""
     arm = arm_of(robot)
     loaded = replace(arm, payload=LOAD)
     first = random_spline(arm, 1)

@@ -1,4 +1,4 @@
-"""The real logs, for the tests that need them."""
+"""The real logs, shared by several tests."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def by_number() -> LogReading:
 
 
 def by_empty_cells() -> LogReading:
-    """As a table of pandas with the efforts of one joint."""
+    """A table written by pandas, with the efforts of one joint."""
     rows = table()
     at = [k for k, name in enumerate(rows[0]) if name.startswith("i") and name != f"i{ELBOW + 1}"]
     for row in rows[1:]:

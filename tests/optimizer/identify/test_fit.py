@@ -233,7 +233,7 @@ def test_moves_along_one_motion_are_no_validation(moves: int) -> None:
 
 
 def test_one_long_move_is_fitted_by_its_seconds() -> None:
-    """There is nothing to hold out, but other logs can validate."""
+    """No move can be held out, but other logs can validate."""
     truth = truth_of(ROBOT)
     log = without_power(recorded(ROBOT, truth, moves=6).log())
     one = replace(log, moves=(LogMove(0, len(log.q), False),))
@@ -357,12 +357,12 @@ def test_torque_constants_follow_from_gravity_where_the_payload_is_known() -> No
         constant = by_name["torque_constant", joint]
         assert constant.identified and constant.sd < 0.02 * real[joint] / FAR
         assert abs(constant.value - real[joint]) <= FAR * constant.sd
-    # nothing hangs on wrist 3
+    # gravity exerts no torque on wrist 3
     wrist = by_name["torque_constant", 5]
     assert not wrist.identified and wrist.value == ROBOT.drives.torque_constant[5]
     coulomb = by_name["coulomb", 1]
     assert abs(coulomb.value - truth.coulomb[1]) <= FAR * coulomb.sd
-    # by themselves, unless the payload or the links are not known
+    # torque constants are fitted by default, unless the payload or the links are unknown
     letters = dict(ROBOT.figures)
     mass = letters["inertials"]["mass"] | {"trust": "E"}
     letters["inertials"] = letters["inertials"] | {"mass": mass}

@@ -120,9 +120,9 @@ def test_errors_of_held_figures_move_the_others_as_far_as_a_fit_with_such_errors
 
 @pytest.mark.long
 def test_base_parameters_count_the_errors_of_figures_that_are_held() -> None:
-    """For units as far from engineering defaults as the defaults' ranges state, figures found
-    beside held ones are within three standard deviations. Without the errors of held figures, 3 of
-    57 are not, by up to 7."""
+    """For units within the ranges of engineering defaults, figures found beside held ones are
+    within three standard deviations. If the errors of held figures are left out, 3 of 57 are
+    outside, by up to 7."""
     arm, names = load_robot("gen3"), ("coulomb", "viscous", "rotor_inertia")
     distance, held = list[float](), 0
     for seed in range(5):
@@ -166,7 +166,7 @@ def relettered(section: dict[str, dict[str, object]], letter: str) -> dict[str, 
 
 
 def log_of_little_friction(seed: int) -> Log:
-    """A short, noisy log of a unit with a tenth of the default Coulomb friction in its last joint."""
+    """A short, noisy log of a unit with a tenth of the last joint's default Coulomb friction."""
     truth = truth_of(ARM, seed)
     coulomb = truth.coulomb.copy()
     coulomb[JOINT] = 0.1 * ARM.friction.coulomb[JOINT]
@@ -189,7 +189,7 @@ def test_an_own_value_is_kept_unless_it_is_rejected_or_the_logs_know_it_better()
 
 
 def test_engineering_defaults_are_known_less_well_than_figures_with_a_source() -> None:
-    """By the ranges of `default_ranges.yaml`, as standard deviations of logarithms."""
+    """The ranges of `default_ranges.yaml` are read as standard deviations of logarithms."""
     names = [("coulomb", JOINT), ("rotor_inertia", JOINT), ("offset", JOINT)]
     own = np.array([ARM.friction.coulomb[JOINT], ARM.drives.rotor_inertia[JOINT], 1.0])
     width = 2 * 1.6449
@@ -217,7 +217,9 @@ def test_figures_of_earlier_logs_are_as_well_known_as_their_document_says() -> N
 
 @pytest.mark.parametrize("method", long_but(["automatic"], ["automatic", "base_parameters"]))
 def test_a_small_figure_takes_its_estimate_where_the_own_value_is_a_default(method: Method) -> None:
-    """Its standard deviation is large beside its value, and small beside the error of a default."""
+    """The standard deviation is large relative to the figure, and small relative to the default's
+    error.
+    """
     options = IdentificationOptions(method=method, constants=False, held_out=0.0)
     default = float(ARM.friction.coulomb[JOINT])
     estimated, kept = list[float](), 0

@@ -104,9 +104,7 @@ def test_nearness_does_not_depend_on_the_frame() -> None:
 
 
 def test_the_nearest_real_body_is_found() -> None:
-    """Of an impossible body: the solution is real, and no real body between it and the start is
-    nearer.
-    """
+    """For an impossible body, the result is real, and all bodies between the two are impossible."""
     wrong = pin.Inertia(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.06])).toDynamicParameters()
     metric = distance_metric(
         pin.Inertia(2.0, np.zeros(3), np.diag([0.03, 0.04, 0.05])).toDynamicParameters()

@@ -108,8 +108,8 @@ def test_ten_seconds_at_rest_are_asked_for_where_no_power_was_logged() -> None:
 
 @pytest.mark.parametrize("channels", long_but(["currents"], ["currents", "power"]))
 def test_a_known_figure_takes_its_share_out_of_the_interval(channels: str) -> None:
-    """Against the intervals of answers, of the document and of a document with the figure known
-    exactly.
+    """The reference is the change of the intervals, of answers and of the document, once the figure
+    is known exactly.
     """
     log = recorded(ROBOT, TRUTH, moves=8).log()
     log = replace(log, power=None) if channels == "currents" else _of_power(log)

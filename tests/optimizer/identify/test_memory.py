@@ -15,7 +15,7 @@ from joulepath.models.registry import load_robot
 from tests.identification_logs import Form, csv_of, recorded, truth_of
 
 ROOT = Path(__file__).parents[3]
-# of the rows and columns of a fit with the links' inertials, beside the log
+# of the rows and columns of a fit with the links' inertials, in addition to the log
 MOST_MEMORY = 100e6
 PEAK = """
 def peak():
@@ -96,7 +96,7 @@ def test_a_million_rows_of_a_file_are_refitted_within_memory(tmp_path: Path, for
 
 @pytest.mark.long
 def test_a_refit_of_a_million_rows_stays_within_memory() -> None:
-    """In a separate process, so its peak includes nothing else."""
+    """A separate process runs the refit, so its peak includes nothing else."""
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], capture_output=True, text=True, check=True, cwd=ROOT
     )

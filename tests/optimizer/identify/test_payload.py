@@ -167,7 +167,7 @@ def test_torque_constants_need_a_payload_that_is_known() -> None:
     ):
         with pytest.raises(PayloadUnknown) as caught:
             identify(ROBOT, logs, options)
-        # gravity pulls at neither the first nor the last joint
+        # gravity exerts no torque on the first and the last joint
         assert {0, 5} <= set(caught.value.joints) and not {1, 2} & set(caught.value.joints)
 
 

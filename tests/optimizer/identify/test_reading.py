@@ -128,7 +128,7 @@ def test_jitter_goes_onto_a_uniform_grid(recording: Recording) -> None:
 
 
 def test_a_long_log_is_interpolated_as_by_one_spline() -> None:
-    """With jitter, lost rows and a gap; a spline of all rows needs more memory than they do."""
+    """The log has jitter, lost rows and a gap; a single spline of all rows needs more memory."""
     random, count = np.random.default_rng(0), 50_000
     times = (np.arange(count) + random.uniform(-0.45, 0.45, count)) / 500
     times = np.delete(
@@ -233,7 +233,7 @@ def test_payload_of_the_log_or_the_caller(recording: Recording) -> None:
     lines = csv_of(recording, "rtde").decode().splitlines()
     lines = [lines[0] + ",payload", *(line + ",2.5" for line in lines[1:])]
     body = "\n".join(lines).encode()
-    # the arm carried nothing in truth: its efforts do not fit the mass
+    # the flange was empty in truth: the efforts contradict the mass
     reading = read_log(body, ROBOT, LogOptions(effort="current"))
     assert reading.log.payload.mass == 2.5
     assert any("2.5 kg, without its centre of mass" in each for each in reading.report.warnings)

@@ -107,7 +107,7 @@ def test_gains_of_sensors_are_not_taken_for_links() -> None:
     gains = [each for each in found.parameters if each.figure == "sensor_gain"]
     for each, real in zip(gains, gain.tolist(), strict=True):
         assert each.value == pytest.approx(real, abs=3 * each.sd)
-    # a gain of 8 % is told with a deviation of 1.5 % at most, by the joints beside it
+    # the other joints determine a gain of 8 % with a deviation of at most 1.5 %
     assert gains[3].sd < 0.015
     friction = [each.value for each in found.parameters if each.figure == "sensor_coulomb"]
     assert friction == pytest.approx([BEARING] * PANDA.nq, rel=0.05)
@@ -203,7 +203,9 @@ def test_the_reader_takes_the_side_of_the_robots_limits_or_as_told() -> None:
 
 
 def test_measured_energy_is_the_same_from_either_side() -> None:
-    """Of an arm with the robot's own friction and rotors: its sensors do not see these."""
+    """The arm has the robot's own friction and rotors, which are invisible to sensors behind the
+    gears.
+    """
     truth = replace(
         truth_of(PANDA),
         coulomb=PANDA.friction.coulomb,
@@ -227,7 +229,7 @@ def test_measured_energy_is_the_same_from_either_side() -> None:
 
 
 def test_torques_behind_the_gears_without_noise_predict_energies() -> None:
-    """The priors alone tell the gains of the sensors from the masses of the links."""
+    """The priors alone separate the gains of the sensors from the masses of the links."""
     robot = load_robot("ur10e")
     truth = truth_of(robot, 3)
     silent = recorded(robot, truth, moves=6, seed=3, noise=SILENT)

@@ -82,7 +82,7 @@ def check(found: Identification, log: Log) -> None:
     "terms", [("coulomb",), ("viscous", "offset"), ("coulomb", "curved"), ("coulomb", "viscous")]
 )
 def test_a_law_of_some_terms_is_the_best_one_of_these(name: str, terms: tuple[Term, ...]) -> None:
-    """Against least squares of its own, with bounds: the robot's own law has other terms, too."""
+    """The reference is a bounded least-squares fit: the robot's own law has further terms."""
     robot = load_robot(name)
     log = log_of(robot, still=None, power=None)
     options = IdentificationOptions(terms=terms, constants=False, held_out=0.0)

@@ -45,7 +45,7 @@ def worst_ratio(arm: Arm, rates: Rates, lower: Array, upper: Array) -> float:
 
 
 def torque_ratios(arm: Arm, q: Array, rates: Rates) -> Array:
-    """Largest torque / limit of each joint at a posture q (nq,) [rad], shape (nq,)."""
+    """Largest torque / limit per joint at a posture q (nq,) [rad], shape (nq,)."""
     payload = arm.payload
     half = Payload(payload.mass / 2, payload.com, payload.inertia / 2)
     arms = [arm, replace(arm, payload=half), replace(arm, payload=Payload())]

@@ -75,7 +75,7 @@ def test_the_terms_give_the_torques_of_pinocchio(name: str) -> None:
     ("name", "half"), long_but([("panda", 0.4)], [("ur5e", 0.4), ("panda", 0.4), ("ur10e", 0.1)])
 )
 def test_the_bound_of_a_box_holds_inside_it(name: str, half: float) -> None:
-    """And is near: a box is not refused without a reason."""
+    """The bound is also close to the maximum: a box is not refused without a reason."""
     arm = loaded(name, com=(0.03, 0.02, 0.1))
     limits = arm.active_limits
     rates, nq = Rates(limits.v_max / 2, limits.a_max / 4), arm.robot.nq
@@ -109,7 +109,7 @@ def attacked(arm: Arm, found: JointLimits) -> float:
 
 
 def test_no_attack_exceeds_a_torque_limit() -> None:
-    """And one comes near it: the limits are not needlessly low."""
+    """One attack comes close to a limit, so the joint limits are not needlessly low."""
     arm = loaded("ur5e", com=(0, 0, 0.1))
     found = joint_limits(arm)
     assert 0.9 < attacked(arm, found) <= 1
@@ -173,7 +173,9 @@ def test_the_file_of_several_moves_claims_no_payload_for_all() -> None:
 
 
 def test_a_single_joint_is_limited_by_the_torque_of_a_pendulum() -> None:
-    """In all postures of a horizontal axis: I a + m g r, without friction and at any speed."""
+    """In all postures of a horizontal axis, the torque is I a + m g r, without friction and at any
+    speed.
+    """
     bar = robot(Description(urdf=PENDULUM, tip="bar", acceleration=500.0, payload=1.0))
     arm = Arm(robot=bar)
     found = joint_limits(arm)

@@ -123,8 +123,8 @@ def test_nodes_give_kinetic_energy_back(space: Basis) -> None:
 
 
 def test_the_grid_finds_peaks(space: Basis) -> None:
-    """Of speed, acceleration and jerk of random motions, against ten thousand samples; jerk jumps
-    at repeated knots.
+    """Peaks of speed, acceleration and jerk of random motions agree with ten thousand samples; jerk
+    jumps at repeated knots.
     """
     rng = np.random.default_rng(3)
     eps = 1e-12
@@ -154,7 +154,7 @@ def test_anchors_hold_the_ends_of_every_span(space: Basis) -> None:
 
 @pytest.mark.parametrize("repeat", [1, 2, 3])
 def test_graded_knots(repeat: int) -> None:
-    """Repeated at every switch as often as asked, and nowhere further apart than allowed."""
+    """Knots are repeated at every switch as requested, and no span exceeds the allowed width."""
     widest = 0.09
     space = bspline.graded(SWITCHES, repeat, widest)
     inner = space.knots[DEGREE + 1 : -DEGREE - 1]
@@ -298,7 +298,7 @@ def test_spans_grow_from_the_ramps(duration: float, repeat: int) -> None:
 
 
 def test_no_ramp_is_too_short_for_a_knot() -> None:
-    """Of ten minutes, a ramp of a hundredth of a second: there is a knot at the finest distance."""
+    """A ramp of a hundredth of a second in ten minutes has a knot at the smallest spacing."""
     breaks = np.unique(RAMPS.space(np.array([2e-6, 1 - 2e-6]), 3, COUNT).knots)
     assert breaks[1] == RAMPS.shortest_end_span and breaks[-2] == 1 - RAMPS.shortest_end_span
 

@@ -97,7 +97,7 @@ def test_its_states_are_those_of_ruckig(robot: str) -> None:
         if k % 3 == 1:
             goal[2] = start[2]
         if k % 3 == 2:
-            # some joints stand still, others hardly move
+            # some joints are at rest, others hardly move
             goal = start + (rng.random(len(start)) < 0.5) * 10.0 ** rng.uniform(-9, -1, len(start))
         found = ruckig_motion._ruckig(limits, start, goal)
         if found.duration == 0:

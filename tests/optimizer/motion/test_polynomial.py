@@ -105,7 +105,7 @@ def bernstein_of_quintic(degree: int) -> Array:
 
 @pytest.mark.parametrize("m", COUNTS)
 def test_peaks_of_a_high_degree(m: int) -> None:
-    """Against samples a hundred times finer: never below them, and hardly above."""
+    """Peaks are never below samples a hundred times finer, and hardly above them."""
     rng, space = np.random.default_rng(7 * m), polynomials(m)
     motion = spline_of(space, rng.uniform(-1, 1, (m + 2, 4)), 0.9)
     curve = BSpline(motion.knots, motion.control_points, motion.degree)

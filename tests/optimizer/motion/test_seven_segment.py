@@ -140,7 +140,9 @@ def test_switches_make_a_motion_of_the_travel(stretch: float) -> None:
 
 
 def test_the_joint_that_needs_longest_leads() -> None:
-    """Its switches, though another joint travels further: limits differ."""
+    """The switches belong to the slowest joint, although another joint travels further: limits
+    differ.
+    """
     own = limits(v_max=[3, 3, 3, 3, 3, 0.8])
     displacement = np.array([2.0, 0.1, 0.2, -0.3, 0.0, -1.5])
     duration = 1.1 * float(shortest_duration(displacement, own))

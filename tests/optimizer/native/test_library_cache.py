@@ -60,7 +60,7 @@ def test_libraries_that_rested_longest_leave(
 
 
 def test_several_processes_make_one_library(tmp_path: Path) -> None:
-    """One compiles, the others wait for it, and nothing is left lying about."""
+    """One process compiles, the others wait for it, and no temporary files remain."""
     calls, script, target = (tmp_path / name for name in ("calls", "compiler", "cache/kernel.so"))
     script.write_text(f'#!/bin/sh\necho call >> {calls}\nsleep 0.1\ncp "$1" "$3"\n', "utf-8")
     script.chmod(0o755)
@@ -109,7 +109,7 @@ def test_a_compiler_that_hangs_is_killed_with_all_that_it_started(
         compile_library(target, (), lambda: "", HASTY)
     assert len(hung.read_text().split()) == 2
     until_gone(hung)
-    # nothing but the lock and a note are left, and the lock is free
+    # only the lock and a note remain, and the lock is free
     assert sorted(path.name for path in target.parent.iterdir()) == ["arm.hung", "arm.lock"]
     with target.with_suffix(".lock").open("wb") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -169,7 +169,9 @@ def test_a_program_that_ends_takes_a_hung_compiler_along(tmp_path: Path, hung: P
 
 
 def test_killed_processes_leave_one_hung_compiler_at_most(tmp_path: Path, hung: Path) -> None:
-    """It has inherited the lock: whoever comes later gives up instead of starting another one."""
+    """The hung compiler has inherited the lock: later processes give up instead of starting another
+    one.
+    """
     code = (
         "import sys; from pathlib import Path; from joulepath.optimizer.native.library_cache "
         "import compile_library\n"
@@ -193,7 +195,9 @@ def test_killed_processes_leave_one_hung_compiler_at_most(tmp_path: Path, hung: 
 def test_a_compiler_that_the_end_of_the_program_kills_is_no_failure(
     tmp_path: Path, hung: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its folder may be gone before its thread: no script ends with a message on a lost log."""
+    """The folder may disappear before the thread ends: no script ends with a message about a lost
+    log.
+    """
     monkeypatch.setattr(library_cache, "_ending", threading.Event())
     ended: list[BaseException] = []
 

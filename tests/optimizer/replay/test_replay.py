@@ -118,8 +118,8 @@ def test_an_optimised_motion_is_what_happens() -> None:
 
 
 def test_joints_at_the_knee_of_friction_follow() -> None:
-    """At a milliradian per second friction is most of the torque, and changes by half of itself
-    from joint to joint.
+    """At a milliradian per second, friction is most of the torque, and differs by half between
+    joints.
     """
     goal = START + 1e-3 * np.array([1.0, -1.0, 0.5, 2.0, -0.2, 3.0])
     plan = quintic(ARM, START, goal, 1.0)
