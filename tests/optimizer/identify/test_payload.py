@@ -26,8 +26,8 @@ NOISE = Noise(current=0.1)
 
 
 def log_of(carried: Payload, seed: int, said: Payload, motions: int = 0) -> Log:
-    """A log of a unit with other friction than the robot's own; the carried and the stated payload
-    differ.
+    """A log of a unit with other friction than the robot's own; the stated payload may differ from
+    the carried one.
     """
     truth = replace(truth_of(ROBOT, seed), payload=carried)
     log = recorded(ROBOT, truth, moves=12, seed=motions, noise=NOISE).log()

@@ -118,8 +118,8 @@ def test_a_compiler_that_hangs_is_killed_with_all_that_it_started(
 def test_temporary_files_of_a_compiler_go_with_its_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A killed compiler leaves temporary files, and so does a killed process with its working
-    folder.
+    """Temporary files of a killed compiler are removed, and so is the old working folder of a
+    killed process.
     """
     compiler, names = tmp_path / "compiler", tmp_path / "names"
     compiler.write_text(f"#!/bin/sh\nmktemp >> {names}\nexit 1\n", encoding="utf-8")
