@@ -310,7 +310,7 @@ def test_the_conjugate_is_the_greatest_value() -> None:
 
 
 def test_the_conjugate_allows_for_the_load() -> None:
-    """It covers every ω̂ between ω / (1 + load) and ω / (1 - load)."""
+    """With a load, the conjugate covers every ω̂ between ω / (1 + load) and ω / (1 - load)."""
     load, rng = np.array([0.2, 0.1, 0.05, 0.0, 0.3, 0.9]), np.random.default_rng(3)
     friction = FrictionConjugate.of(replace(ROBOT.friction, load=load), ROBOT.limits.v_max)
     assert friction is not None

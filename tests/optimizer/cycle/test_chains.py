@@ -21,7 +21,7 @@ from joulepath.optimizer.deadline import NEVER
 
 
 def least_of_all(costs: list[Array], closed: bool) -> float:
-    """By trying every chain."""
+    """Least cost of a chain, by brute force."""
     best = np.inf
     for nodes in product(*(range(cost.shape[0]) for cost in costs), range(costs[-1].shape[1])):
         if not closed or nodes[0] == nodes[-1]:
@@ -162,7 +162,7 @@ def spline(q: float) -> Spline:
 
 
 class Late(Known):
-    """A search with every pair exceeding its share of the time."""
+    """A search without enough time to solve any pair."""
 
     def attempt(self, k: int, s: int, g: int) -> float | None:
         return self.out_of_time()

@@ -225,7 +225,7 @@ def assert_least(
     earlier: list[set[int]],
     closed: bool,
 ) -> None:
-    """A tour is one of these costs, and no other one has less."""
+    """Check a tour against all tours: its cost is correct and the least."""
     least = np.inf
     for order in permutations(range(4)):
         if any(

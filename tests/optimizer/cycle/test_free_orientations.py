@@ -74,7 +74,7 @@ def seam(start: Any, goal: Any, **path: Any) -> Cycle:
 
 @pytest.fixture
 def few_angles(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fewer angles than in a request, since every angle is one more path to solve."""
+    """Fewer angles than in a request, since every angle means one more path to solve."""
     turns = replace(tool_turns.TOOL_TURNS, angles=(0.0, 2.0), orientations=4)
     monkeypatch.setattr(tool_turns, "TOOL_TURNS", turns)
     settings = replace(free_orientations.FREE_ORIENTATIONS, steps_on_paths=(0.3,), steps=(0.3, 0.1))
@@ -172,7 +172,7 @@ def free_stops(**changes: Any) -> Cycle:
 
 
 def assert_reached(found: CycleSolution, arm: Arm, name: str, at: Any, tilt: float = 0.0) -> None:
-    """The tool is at a stop, and its axis within a cone about straight down."""
+    """Check for a stop with the tool in place and its axis within a cone about straight down."""
     (goal,) = [move.solution.goal for move in found.moves if move.planned.goal == name]
     T = tcp_pose(goal.q, arm.T_flange_tcp).T
     assert goal.target == 0

@@ -34,7 +34,7 @@ POSTURES = {
 
 
 def cycle_of(robot: str) -> tuple[Cycle, Array]:
-    """A closed cycle from a posture over the poses of two others, and these."""
+    """A closed cycle from one posture over the poses of others, and these other postures."""
     arm, (start, *q) = Arm(robot=load_robot(robot), collisions=False), np.array(POSTURES[robot])
     stops = [Stop(name=str(k), target=Pose(tcp_pose(arm, each))) for k, each in enumerate(q)]
     return Cycle(arm=arm, start=start, stops=stops, windings=False, deadline=AMPLE), np.array(q)

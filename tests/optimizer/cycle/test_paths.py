@@ -333,7 +333,7 @@ def test_the_parts_are_as_few_and_as_cheap_as_can_be(seed: int) -> None:
 
 
 def _brute(on: Array, cost: Array) -> tuple[float, int]:
-    """The least cost of the fewest changes, and how many these are."""
+    """The fewest changes between segments, and the least cost of as many changes."""
     ends, layer = len(on) - 1, {(a, 0): 0.0 for a in np.flatnonzero(on[0]).tolist()}
     for changes in range(on.shape[1] + 1):
         done = [total for (a, at), total in layer.items() if on[at:, a].all()]

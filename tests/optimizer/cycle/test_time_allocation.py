@@ -44,7 +44,7 @@ class Move:
 
     @property
     def energy(self) -> float:
-        """Its energy [J]."""
+        """Energy of the move [J]."""
         return self.swing / self.duration**2 + self.drawn * self.duration - self.gained
 
     def at(self, price: float) -> Move:
@@ -85,7 +85,7 @@ def least(moves: list[Move], time: float, waiting: float) -> float:
 
 
 def fastest(moves: list[Move]) -> list[Move]:
-    """The moves as fast as they can be."""
+    """The moves at their shortest durations."""
     return [replace(move, duration=move.shortest) for move in moves]
 
 
@@ -160,7 +160,7 @@ def test_one_move_and_moves_of_one_duration() -> None:
 def test_where_the_durations_jump_the_best_is_not_known() -> None:
     @dataclass(frozen=True)
     class Jumping(Move):
-        """A move with two speeds, fast and slow, and so with a nonconvex energy."""
+        """A move with a fast and a slow speed only, and so with a nonconvex energy."""
 
         def at(self, price: float) -> Jumping:
             """The better of the two."""
@@ -185,7 +185,7 @@ def motion(duration: float, energy: float) -> PricedMotion:
 def move(
     monkeypatch: pytest.MonkeyPatch, known: list[PricedMotion], *solved: PricedMotion | None
 ) -> PricedPair:
-    """A move with these results of consecutive solves."""
+    """A move with the given results of consecutive solves."""
     results = iter(solved)
     monkeypatch.setattr(priced_search, "priced_motion", lambda *_: next(results))
     return PricedPair(cast(Leg, None), 0, 0, LONGEST, NEVER, known)

@@ -52,13 +52,13 @@ ASKED = pick_and_place(1, 2, windings=False)
 
 @cache
 def free() -> CycleSolution:
-    """The cycle of least energy in its own time."""
+    """The cycle of least energy in free time."""
     return plan_cycle(ASKED)
 
 
 @cache
 def shortest() -> float:
-    """Duration [s] of the fastest cycle, as the refusal of a faster one tells."""
+    """Duration [s] of the fastest cycle, from the error for a faster request."""
     with pytest.raises(CycleTooShort) as refusal:
         plan_cycle(in_time(ASKED, 0.3 * free().duration))
     return refusal.value.shortest
@@ -69,8 +69,9 @@ def in_time(asked: Cycle, duration: float) -> Cycle:
 
 
 def duration_of(factor: float) -> float:
-    """`factor` times the cycle's own duration [s]; below 1, this share of the way to it from the
-    shortest one.
+    """A duration [s]: `factor` times the free cycle's, or for factors below 1, a point in between.
+
+    The point divides the range from the shortest duration to the free one by `factor`.
     """
     return (
         factor * free().duration

@@ -26,8 +26,10 @@ UR5E = load_robot("ur5e")
 
 @dataclass(frozen=True)
 class Solved:
-    """Branches of the pose of a configuration, their largest pose error [m, rad], and their
-    smallest joint distance [rad] from this configuration.
+    """Branches of the pose of a configuration, with their errors.
+
+    The errors are the largest pose error [m, rad] and the least joint distance [rad] from the
+    configuration.
     """
 
     branches: list[PrincipalSolution]

@@ -171,9 +171,7 @@ def test_a_calibrated_wrist_has_no_self_motion_but_single_configurations(off: fl
 
 
 def skewed() -> Robot:
-    """Spherical wrist on a base with a second axis oblique to the first: its branches have no
-    names.
-    """
+    """Spherical wrist on a base with a second axis oblique to the first, without branch names."""
     model = KUKA.model.copy()
     M = model.jointPlacements[2]
     model.jointPlacements[2] = pin.SE3(

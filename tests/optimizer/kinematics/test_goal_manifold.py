@@ -138,8 +138,9 @@ DIFFERENCES = 1e-2
 
 
 def curve_of(name: str, seed: int) -> tuple[HeldPose, Array]:
-    """Curve through a random configuration in the middle of the joint ranges, and this
-    configuration.
+    """The curve through a random configuration in the middle of the joint ranges.
+
+    Returns the curve and the configuration.
     """
     robot = load_robot(name)
     limits, rng = robot.limits, np.random.default_rng(seed)

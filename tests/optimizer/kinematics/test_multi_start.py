@@ -30,7 +30,7 @@ from tests.selection import long_but
 CHAIN = serial_chain(6)
 # axes turned by up to 17° and moved by up to 0.3 m: none are parallel, and none meet
 ODD = [calibrated(UR5E, 0.3, seed) for seed in (1, 2, 3)]
-# deadline that no search comes near, however busy the machine [s]
+# deadline beyond the time of any search, even on a busy machine [s]
 AMPLE = 300.0
 
 

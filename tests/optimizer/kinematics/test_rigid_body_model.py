@@ -1,4 +1,4 @@
-"""Recently used models: each arm has its own, however many arms there are."""
+"""Recently used models: every arm has its own model, however many arms there are."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Helpers for tests of seven-joint arms whose self-motions are traced."""
+"""Helpers for tests of seven-joint arms with traced self-motions."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def arm(obstacles: Sequence[Obstacle] = (), **fields: Any) -> Arm:
 
 
 def two_stops(obstacles: Sequence[Obstacle] = (), **fields: Any) -> Cycle:
-    """From a pick to a place and back, with 2 kg on the way there."""
+    """A cycle from a pick to a place and back, with a part of 2 kg on the way to the place."""
     stops = [
         Stop(name="pick", target=down(0.5, -0.3, 0.2), payload=PART, dwell=0.2),
         Stop(name="place", target=down(0.5, 0.3, 0.2), payload=Payload()),

@@ -127,7 +127,7 @@ REACHED = 1e-6
 
 
 def between_samples(robot: str, seed: int, free: bool) -> Problem:
-    """From joint positions to a pose: of a Panda with its posture free, or with any orientation."""
+    """A problem from joint positions to a pose with a sampled posture or a free orientation."""
     arm = Arm(robot=load_robot(robot), collisions=False)
     rng = np.random.default_rng(seed)
     limits = arm.robot.limits

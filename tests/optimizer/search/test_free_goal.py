@@ -36,7 +36,7 @@ TOOL = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.2, 0.9), np.array([0.03, -0.02, 0.15]
 
 
 def angle(a: Array, b: Array) -> float:
-    """Between two vectors [rad], by a formula other than the code's."""
+    """Angle [rad] between two vectors, by a different formula than the code."""
     return 2 * float(
         np.arcsin(min(1.0, np.linalg.norm(a / np.linalg.norm(a) - b / np.linalg.norm(b)) / 2))
     )

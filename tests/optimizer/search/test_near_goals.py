@@ -29,7 +29,7 @@ from joulepath.optimizer.search.seeds import estimates
 from tests.optimizer.search.runs import explored, prepared
 from tests.selection import long_but
 
-# s: no search comes near it, however busy the machine
+# s: far more than any search takes, even on a busy machine
 AMPLE = 300.0
 # relative difference of two searches up to the tolerance of their solves
 SAME = 2e-3

@@ -16,7 +16,7 @@ from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.solve_result import MotionOrigin
 from tests.optimizer.search.runs import prepared
 
-# s: no search comes near it, however busy the machine
+# s: far more than any search takes, even on a busy machine
 AMPLE = 300.0
 # m, rad
 HELD = 1e-9

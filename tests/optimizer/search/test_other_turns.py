@@ -18,7 +18,7 @@ from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.seeds import estimates_between, expected
 from tests.optimizer.search.runs import explored, prepared
 
-# s: no search comes near it, however busy the machine
+# s: far more than any search takes, even on a busy machine
 AMPLE = 300.0
 # UR5e: the second joint has 3.0 rad to go one way around, and 3.2 rad the other
 START = np.array([-0.56, 2.62, -0.15, -2.88, -1.61, 1.48])

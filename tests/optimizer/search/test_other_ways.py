@@ -38,7 +38,7 @@ PROBLEM = Problem(
 
 
 def with_one_motion(problem: Problem) -> SearchState:
-    """A search with one solved candidate: the quick posture of the largest estimate."""
+    """A search with one solved candidate, the quick posture with the largest estimate."""
     state = SearchState.of(problem)
     stages.prepare(state)
     quick = [each for each in state.candidates if each.holdable and each.shortest < QUICK]

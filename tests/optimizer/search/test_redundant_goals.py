@@ -40,7 +40,7 @@ from tests.selection import long_but
 REFINED = 1e-3
 # relative
 ROUNDING = 1e-12
-# s: no search comes near it, however busy the machine
+# s: far more than any search takes, even on a busy machine
 AMPLE = 300.0
 # least share by which the copper loss of holding raises at least one bound, and number of tasks to
 # solve
@@ -76,7 +76,7 @@ def pose_of(robot: Robot, q: Array) -> Pose:
 
 
 def members(robot: Robot, q: Array, count: int, seed: int) -> list[Array]:
-    """So many configurations of the pose of q, within the limits, drawn evenly from its curves."""
+    """Random configurations of the pose of q within the limits, spread evenly over its curves."""
     inverse, rng = required_inverse_kinematics(robot, "goal"), np.random.default_rng(seed)
     curves: dict[SelfMotion, SelfMotion] = {}
     for each in inverse.solve(pose_of(robot, q).T):
@@ -168,7 +168,7 @@ def test_no_member_has_a_lower_bound_below_the_curves(
 
 
 def plain_and_held(posed: Problem, monkeypatch: pytest.MonkeyPatch) -> tuple[float, float]:
-    """The bounds [J] of the curves without the copper loss of holding, and with it."""
+    """The bounds [J] of the curves, without and with the copper loss of holding."""
     prepared = PreparedProblem.of(posed)
     candidates = pairs(prepared, ends(prepared, "start")[0], ends(prepared, "goal")[0])
     held = self_motion_bound(prepared, candidates)

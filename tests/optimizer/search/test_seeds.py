@@ -23,7 +23,7 @@ from joulepath.optimizer.search.seeds import (
 from tests.optimizer.search.runs import prepared
 from tests.selection import long_but
 
-# s: no search comes near it, however busy the machine
+# s: far more than any search takes, even on a busy machine
 AMPLE = 300.0
 # largest ratio of an estimate to the least energy; estimates are motions with two parameters
 HIGHEST = 1.4
@@ -134,7 +134,7 @@ def test_the_next_seeds_follow_until_none_is_left() -> None:
 
 
 def downwards(name: str, high: list[float], low: list[float], bus: Bus) -> Problem:
-    """With the rated payload from one pose down to another."""
+    """A problem between two poses, downwards with the rated payload."""
     robot = load_robot(name)
     arm = Arm(robot=robot, payload=Payload(mass=robot.rated_payload), collisions=False, bus=bus)
     start, goal = (Pose(tcp_pose(arm, np.array(q))) for q in (high, low))

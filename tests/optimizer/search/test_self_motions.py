@@ -133,7 +133,7 @@ def test_a_free_turn_about_the_last_axis_may_meet_a_stretched_wrist() -> None:
 
 BESIDE = np.array([0.0, -1.4, 1.5, 0.2, 0.5, 0.1])
 ALIGNED = np.array([0.3, -1.2, 1.4, 0.5, 0.0, -0.4])
-# s: no search comes near it, however busy the machine
+# s: far more than any search takes, even on a busy machine
 AMPLE = 300.0
 
 

@@ -32,7 +32,7 @@ BEST_DURATION = 1.644
 BEST_WORK = 33.64066
 # relative; promised against the least known work
 PROMISED = 5e-3
-# s: no search comes near it, however busy the machine
+# s: far more than any search takes, even on a busy machine
 AMPLE = 300.0
 # displacement of an end [rad] far above rounding, and the rounding of a joint limit
 MOVED = 1e-3

@@ -1,4 +1,4 @@
-"""Few generations of the genetic algorithm, whose tests do not need its best motions."""
+"""Few generations of the genetic algorithm, sufficient for its tests."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def test_what_a_method_compares_is_what_its_interval_makes_least() -> None:
 
 
 def test_a_known_motion_counts_if_it_is_certified() -> None:
-    """A polynomial is slower than a known spline, which is then the fastest motion unchanged."""
+    """If a known spline is faster than any polynomial, it is the fastest motion."""
     splines, polynomials = asked().state, asked(method="lagrange").state
     known = fastest_of(splines, splines.candidates[0])
     candidate = polynomials.candidates[0]

@@ -49,9 +49,7 @@ def random_motion(
 
 
 def estimate(prepared: PreparedProblem, spline: Spline) -> Array:
-    """What decides whether a motion is far below the torque limits (nq,): it must stay below
-    `far_below` of them.
-    """
+    """Estimate (nq,) of the largest torques of a motion, for the comparison with `far_below`."""
     _, _, v, a, tau, _ = prepared.report_samples(spline)
     parts = limited_parts(prepared.arm, tau, v, a)
     return np.asarray(sum(np.abs(part).max(axis=0) for part in parts))

@@ -1,6 +1,6 @@
-"""The methods against each other: every answer certified, and none below what a wider space can do.
+"""The methods against each other: answers are certified, and none is below a wider space's answer.
 
-Limits, fixed durations and deadlines of each are in `test_sqp_method`.
+Limits, fixed durations and deadlines of the methods are tested in `test_sqp_method`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from tests.selection import long_but
 # relative excess of the energy in a wider space over a narrower space: both are solved to 5e-5,
 # with smoothed friction
 WIDER_SPACE = 2e-3
-# relative tolerance of the least energy over factors, which are found to 1e-5
+# relative tolerance of the least energy over factors, with factors found to 1e-5
 LEAST_ENERGY = 1e-6
 
 
@@ -119,7 +119,7 @@ def test_a_polynomial_spends_no_more_than_the_quintic_that_it_could_be() -> None
 
 
 def test_the_factor_is_the_best_of_many() -> None:
-    """Compared with the motion retimed by a hundred factors."""
+    """No other factor gives less energy, in a comparison with a hundred factors."""
     for start, goal in random_moves(53, 4):
         task = PreparedProblem.of(problem(start, goal, method="uniform_scaling"))
         solution = solved("uniform_scaling", start, goal)

@@ -118,7 +118,10 @@ def test_many_states_are_checked_only_where_few_were_in_vain(
     thorough: bool,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Walled in, the planning uses all its states; with other candidates open, it is postponed."""
+    """With no other candidate open, the planning between walls uses all its states.
+
+    With other candidates open, it uses few states and the candidate is postponed.
+    """
     limited = replace(planned_paths.PLANNED_PATHS, few_states=100, most_states=1_000)
     monkeypatch.setattr(planned_paths, "PLANNED_PATHS", limited)
     arm, q_start, q_goal = walled_in()

@@ -125,7 +125,7 @@ def test_a_time_scaled_motion_stays_on_its_line() -> None:
 
 
 def test_minimum_time_ignores_the_duration_asked_for() -> None:
-    """It tells what would be possible."""
+    """The fastest motion ignores the requested duration, so as to report the possible one."""
     quick = spline(solver(START, GOAL, fastest=True).solve()).duration
     for given in (fixed(0.1), fixed(5.0)):
         assert spline(solver(START, GOAL, fastest=True, **given).solve()).duration == pytest.approx(
@@ -140,7 +140,10 @@ def test_a_deadline_that_has_passed_ends_the_attempt(method: str) -> None:
 
 
 def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches_now() -> None:
-    """After the goal moved: in fewer steps than from a fit, at no more energy, within limits."""
+    """After a move of the goal, a solve with knots at the jumps of jerk starts from the old motion.
+
+    It takes fewer steps than a start from a fit, needs no more energy, and is within the limits.
+    """
     steps = np.zeros(2, dtype=int)
     for start, goal in ((START, GOAL), *random_moves(3, 1)):
         own, moved = solver(start, goal + 0.02), solver(start, goal)
@@ -155,7 +158,7 @@ def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches
 
 
 def test_a_sole_candidate_is_refined_at_once() -> None:
-    """The coarse motion is only a guess: the result is that of two solves, within limits."""
+    """A sole candidate's coarse motion is only a guess; the result equals two separate solves."""
     at_once, twice = solver(START, GOAL, is_sole=True), solver(START, GOAL)
     found = spline(at_once.solve())
     coarse = spline(twice.solve())
@@ -185,7 +188,10 @@ def test_else_the_coarse_motion_is_checked(why: str, monkeypatch: pytest.MonkeyP
     ("readings", "refined"), [(25, False), (30, False), (34, False), (200, False), (1000, True)]
 )
 def test_on_a_slow_machine_a_checked_motion_comes_first(readings: int, refined: bool) -> None:
-    """Every reading of the clock takes a share of the time; both solves take 34 readings."""
+    """On a slow machine, the first result is a checked coarse motion without refinement.
+
+    Every reading of the clock takes a share of the time; both solves take 34 readings.
+    """
     ticks = count()
     deadline = Deadline(2.0, clock=lambda: 2.0 * next(ticks) / readings)
     own = solver(START, GOAL, is_sole=True, deadline=deadline)
@@ -195,7 +201,7 @@ def test_on_a_slow_machine_a_checked_motion_comes_first(readings: int, refined: 
 
 
 def test_a_coarse_motion_that_collides_is_no_guess() -> None:
-    """The coarse motion hits the arm itself: clearance constraints are added, as usual."""
+    """A colliding coarse motion is solved again with clearance constraints, not refined."""
     start, goal = list(random_moves(5, 7))[6]
     own, usual = (
         solver(start, goal, collisions=True, is_sole=is_sole) for is_sole in (True, False)
@@ -230,7 +236,10 @@ def test_a_slow_motion_has_its_first_knots_at_the_ramps_and_is_refined_from_itse
     "given", [{}, {"objective": "mechanical", "duration_max": 15.0}, {"limits": ROBOT.limits}]
 )
 def test_other_first_knots_are_evenly_spaced(given: dict[str, object]) -> None:
-    """At the speed limits of the robot, and for least work, which has no longest useful time."""
+    """First knots are evenly spaced at the robot's speed limits, and for least work.
+
+    Least work has no longest useful time.
+    """
     own = slowly(0.1, **given)
     even = bool(np.ptp(np.diff(np.unique(spline(own.solve()).knots))) < 1e-9)
     assert even is bool(given)

@@ -119,7 +119,10 @@ def test_torque_counts_with_payload_and_mounting() -> None:
 
 
 def test_no_law_where_the_arm_cannot_be_held_on_the_way() -> None:
-    """Folded at both ends and stretched in the middle, beyond the torque of the shoulder."""
+    """There is no law if the shoulder cannot hold the arm somewhere on the way.
+
+    The arm is folded at both ends and stretched in the middle.
+    """
     start, goal = np.array([0.0, 0.0, 2.7, 0, 0, 0]), np.array([0.0, 0.0, -2.7, 0, 0, 0])
     ends = np.abs(torques(problem(), np.array([start, goal]), np.zeros((2, 6)), np.zeros((2, 6))))
     middle = np.abs(

@@ -19,7 +19,7 @@ from joulepath.optimizer.motion.bspline import REST_POINTS, Basis
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 from tests.optimizer.moves import ROBOT
 
-# distance of the grid points used, in points of the optimiser's grid; a divisor of those of a span
+# spacing of the peer's grid in points of the optimiser's grid; a divisor of the points per span
 THINNING = 8
 
 

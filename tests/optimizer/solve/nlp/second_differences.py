@@ -21,7 +21,7 @@ EPS = 1e-3
 
 
 def without_dry_friction(program: NonlinearProgram) -> NonlinearProgram:
-    """The program without dry friction, whose reversal is concave and left out of the Hessian."""
+    """The program without dry friction, since the Hessian omits its concave reversal."""
     p = program.p.copy()
     p[places("coulomb", program.kernel.nq)] = 0.0
     return replace(program, p=p)

@@ -31,15 +31,15 @@ GOAL = np.array([1.8, -1.1, 1.9, -2.4, -1.57, 0.4])
 WAYPOINT = np.array([0.0, -0.57, 0.27])
 # tolerance of replayed distances [m]
 REPLAY = 1e-4
-# step of joint positions in differences of distances, which are smooth there [rad]
+# step of joint positions in differences of distances, smooth in this range [rad]
 EPS = 1e-6
 # relative tolerance of gradients
 GRADIENT_TOLERANCE = 1e-4
-# share of an active limit that is used within the margins of the solver
+# least used share of an active limit, due to the margins of the solver
 USED = 0.999
 # the same after peaks between the path points were repaired by one and a half times their excess
 USED_AFTER_REPAIR = 0.997
-# ratio of a clearance above which it is exact
+# ratio of a clearance with exact values above
 COUNTED_SHARE = (
     1
     - (CLEARANCE_CONSTRAINT.gradient_distance - CLEARANCE_CONSTRAINT.reserve)

@@ -77,7 +77,10 @@ def test_the_cost_of_another_goal_is_that_of_its_wait(dwell: Dwell) -> None:
 
 
 def test_no_posture_near_by_waits_for_less() -> None:
-    """Most of this dwell is spent waiting, so that the best posture differs from that without."""
+    """No nearby posture needs less energy for a dwell spent mostly waiting.
+
+    The wait shifts the best posture.
+    """
     asked = Problem(
         arm=ARM,
         start=START,

@@ -104,7 +104,10 @@ def power(case: Case, q: Array, v: Array, a: Array) -> Array:
 
 
 def test_cost_is_the_sum_of_power_over_the_nodes(case: Case) -> None:
-    """Of SciPy's spline in real time: the chain rule v = s' / T, a = s'' / T², and dt = T dτ."""
+    """The cost is the sum of power over the nodes, computed from SciPy's spline in real time.
+
+    The chain rule gives v = s' / T, a = s'' / T², and dt = T dτ.
+    """
     curve, basis, T = motion(case), case.program.basis, case.duration
     t = basis.nodes * T
     expected = T * basis.weights @ power(case, curve(t), curve(t, 1), curve(t, 2))
@@ -112,7 +115,7 @@ def test_cost_is_the_sum_of_power_over_the_nodes(case: Case) -> None:
 
 
 def test_torques_are_those_of_the_motion(case: Case) -> None:
-    """At every node, friction included, from SciPy's spline in real time."""
+    """Torques at every node, with friction, equal the torques of SciPy's spline in real time."""
     curve, t = motion(case), case.program.basis.nodes * case.duration
     q, v, a = curve(t), curve(t, 1), curve(t, 2)
     friction = replace(case.task.friction, knee=SMOOTHING.knee)
@@ -147,7 +150,10 @@ def test_gradient_is_the_slope_of_the_cost(case: Case) -> None:
 
 
 def test_hessian_is_the_slope_of_the_lagrangians_gradient(case: Case) -> None:
-    """Hessian of cost + multiplier · tau in all variables; the row of the duration also alone."""
+    """The Hessian of cost + multiplier · tau is the slope of its gradient in all variables.
+
+    The row of the duration is also compared on its own scale.
+    """
     program, n = without_dry_friction(case.program), case.free.size + 1
     k, j = (index.ravel() for index in np.indices(case.multiplier.shape))
 
@@ -165,7 +171,7 @@ def test_hessian_is_the_slope_of_the_lagrangians_gradient(case: Case) -> None:
 
 
 def test_torque_rows_are_the_slopes_of_torques(case: Case) -> None:
-    """Of chosen joints at chosen nodes, in any order."""
+    """The torque rows of chosen joints and nodes, in any order, are slopes of the torques."""
     rng = np.random.default_rng(2)
     k, j = rng.integers(0, len(case.program.basis.nodes), 40), rng.integers(0, 6, 40)
     n = case.free.size + 1
@@ -196,7 +202,7 @@ def test_rates_are_those_of_the_motion(case: Case) -> None:
 
 
 def test_points_of_the_motion(case: Case) -> None:
-    """Three equal control points at either end; from joints back to coordinates."""
+    """A motion has three equal control points at either end, and joints convert to coordinates."""
     program = case.program
     q = program.joint_points(case.free)
     assert q[:3] == pytest.approx(np.tile(START, (3, 1)), rel=LINEAR_TOLERANCE)

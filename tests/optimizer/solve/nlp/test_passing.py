@@ -1,4 +1,4 @@
-"""Passes of an NLP: iterates pass through them, and their curvature is exact."""
+"""Passes of an NLP: all iterates keep the passes, and the curvature is exact."""
 
 from __future__ import annotations
 

@@ -92,7 +92,10 @@ def test_steps_in_the_null_space_keep_the_poses_to_second_order() -> None:
 
 
 def test_the_curvature_is_that_of_the_cost_along_the_curves() -> None:
-    """In steps of the ends alone: steps of other points would hide the curvature of the curves."""
+    """The curvature equals second differences of the cost along the curves.
+
+    The steps move the ends alone: steps of other points would hide the curvature of the curves.
+    """
     own = without_dry_friction(program())
     free, at = put(own, straight(own))
     steps = [np.zeros_like(free) for _ in range(3)]

@@ -34,13 +34,13 @@ from tests.optimizer.moves import (
 from tests.optimizer.solve.nlp.ipopt_peer import Peer
 from tests.selection import long_but
 
-# relative tolerance of IPOPT's cost: the peer's grid of limits is eight times coarser, so that
-# rates exceed their limits between the points by some 1e-3, and the cost depends little on limits
+# relative tolerance of IPOPT's cost: on the peer's eight times coarser grid, rates exceed their
+# limits between the points by some 1e-3, and the cost depends little on limits
 PEER_TOLERANCE = 5e-4
-# relative decrease of the cost that IPOPT may still find from the optimum: along the flat valleys
-# of mechanical energy a step that promises less than 5e-5 may be the first of many
+# relative decrease of the cost by IPOPT from our optimum: in the flat valleys of mechanical energy,
+# a step with a promised gain below 5e-5 may be the first of many
 REMAINING = 1e-3
-# progress at which a solve stops in the test of first-order conditions
+# progress at the end of a solve in the test of first-order conditions
 FINE_PROGRESS = SQP.progress / 10
 # share of the cost, per largest displacement or per doubling of the time, not explained by
 # multipliers. With a curvature h of the cost, (2 h · FINE_PROGRESS)^½ may remain, and h is some
@@ -104,7 +104,7 @@ def conditions(k: int) -> dict[str, Any]:
 
 @pytest.mark.parametrize("k", long_but((5,), range(len(CONDITIONS))))
 def test_electrical_optimum_is_ipopts(peer: Peer, k: int) -> None:
-    """From the same guess, one move per condition: the same cost, and nearly the same duration."""
+    """Our optimum has the cost of IPOPT's, and nearly its duration, from the same guess."""
     start, goal = list(random_moves(11, len(CONDITIONS)))[k]
     given = conditions(k)
     mine = program(start, goal, **given)
@@ -218,7 +218,7 @@ def test_positions_stay_inside_a_narrow_range() -> None:
 
 @pytest.mark.parametrize("share", [0.3, 0.9, 0.99])
 def test_too_little_time_is_told(share: float) -> None:
-    """In less time than the limits on rates allow, the excess is reported."""
+    """With less time than the limits on rates allow, the status is a failure with the excess."""
     own = limits(v_max=1.5)
     mine = program(START, GOAL, own=own, **fixed(share * shortest(START, GOAL, own)))
     found = solve(mine, quintic(mine), mine.t_max)
@@ -226,7 +226,7 @@ def test_too_little_time_is_told(share: float) -> None:
 
 
 def test_too_little_torque_is_told() -> None:
-    """The shoulder cannot hold the arm."""
+    """With a shoulder too weak to hold the arm, the status is a failure with the excess."""
     own = limits(tau_max=[150, 8, 150, 28, 28, 28])
     mine = program(START, GOAL, own=own)
     found = solve(mine, quintic(mine), 1.5)
@@ -249,7 +249,7 @@ def test_the_deadline_is_checked_in_every_iteration(ticks: int) -> None:
 
 
 def test_an_optimum_is_left_alone() -> None:
-    """Started from its own optimum, the solver stops at once."""
+    """From its own optimum, the solver stops within three iterations."""
     for start, goal in random_moves(14, 4):
         mine = program(start, goal)
         first = solve(mine, quintic(mine), 1.5 * shortest(start, goal))
@@ -259,7 +259,7 @@ def test_an_optimum_is_left_alone() -> None:
 
 
 def test_a_valley_is_followed_to_its_end() -> None:
-    """Mechanical work falls along a valley by many steps that keep their promises."""
+    """Mechanical work falls along a valley by many steps to the end of the valley."""
     start, goal = list(random_moves(12, 29))[28]
     mine = program(
         start,
@@ -297,7 +297,7 @@ def test_a_solve_ends_early_only_if_its_optimum_is_not_below_what_is_asked_for(
 
 
 def test_electrical_optimum_does_not_depend_on_the_guess() -> None:
-    """Bent motions and durations too short and too long all lead to the same cost."""
+    """All guesses lead to the same cost: bent motions, and too short or too long durations."""
     rng = np.random.default_rng(3)
     mine = program(START, GOAL)
     costs = []

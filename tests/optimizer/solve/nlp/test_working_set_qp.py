@@ -78,14 +78,14 @@ def test_no_limit_has_two_rows(share: float) -> None:
 
 
 def test_further_constraints_let_a_step_promise_less() -> None:
-    """A QP ends with its first solution if, and only if, that promises too little."""
+    """A QP ends with its first solution exactly if this solution promises too little."""
     p = of_duration(1.2)
     rng = np.random.default_rng(9)
     ended = 0
     for _ in range(20):
         free = quintic(p) + 0.02 * rng.normal(size=(p.free_count, p.r))
         inputs = inputs_at(p, WorkingSetQP(p, p.t_max), free, rng)
-        # no step so long that a bound shortens it
+        # a short enough step, so that no bound shortens it
         inputs = replace(inputs, gradient=0.1 * inputs.gradient)
 
         def promised(rounds: int, enough: float = -np.inf, inputs: QPInputs = inputs) -> float:
