@@ -126,7 +126,8 @@ def test_the_model_takes_the_json_and_nothing_else() -> None:
 def test_the_schema_has_meanings_and_units() -> None:
     schema = model_of(Whole).model_json_schema()
     place, own = schema["$defs"]["Place"], schema["properties"]
-    assert schema["description"] == "Everything at once." and place["description"] == "Where."
+    assert schema["description"] == "A class with all kinds of fields."
+    assert place["description"] == "A place."
     assert place["properties"]["x"] == {
         "title": "X",
         "type": "number",
