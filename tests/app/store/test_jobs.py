@@ -178,17 +178,21 @@ async def test_owners_take_turns_however_many_jobs_they_have(bench: Bench) -> No
     assert owners[6:] == [owner for owner in owners[:3] if owner is not None]
 
 
-async def test_the_owner_that_was_served_last_comes_last(bench: Bench) -> None:
-    """Owners take turns by single requests, as with a single worker."""
-    served = list[str | None]()
-    await bench.create(30, owner="long")
-    await bench.create(3, owner="short")
+@pytest.mark.parametrize("jobs_of", [{"long": [30], "short": [3]}, {"A": [1] * 6, "B": [1] * 6}])
+async def test_the_owner_that_was_served_last_comes_last(
+    bench: Bench, jobs_of: dict[str, list[int]]
+) -> None:
+    """Owners take turns by single requests, as with a single worker, in one job or in many."""
+    for owner, sizes in jobs_of.items():
+        for size in sizes:
+            await bench.create(size, owner=owner)
+    served, order = list[str | None](), list[str | None]()
     for _ in range(6):
         (lease,) = await bench.lease("a", served=served)
         served = [owner for owner in served if owner != lease.owner] + [lease.owner]
+        order.append(lease.owner)
         await bench.settle("a", done(lease))
-    assert len(await bench.lease("a", 99)) == 27
-    assert (await bench.lease("a", 1)) == []
+    assert set(order[:2]) == set(jobs_of) and order[2:] == order[:-2]
 
 
 async def test_cancelling_ends_what_waits_and_then_what_runs(bench: Bench) -> None:
