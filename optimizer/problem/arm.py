@@ -323,8 +323,8 @@ class Arm:
         if narrow.any():
             raise InvalidProblem(
                 "limits.position",
-                f"The range of {self.robot.joint_names[int(narrow.argmax())]} is too narrow: "
-                f"upper must exceed lower, by {ARM_RANGES.least_range:g} rad on arms of 7 joints or more.",
+                f"The range of {self.robot.joint_names[int(narrow.argmax())]} is too narrow: upper "
+                f"must exceed lower, by {ARM_RANGES.least_range:g} rad with more than six joints.",
             )
 
     def no_faster_than(self, tcp_speed: float | None) -> Arm:

@@ -71,13 +71,16 @@ class IdentifyTask:
 
 
 def _check_unseen(others: Sequence[Log], fitted: Sequence[Log]) -> None:
-    """Raises InvalidProblem if a log that validates the figures is one of the fit, by whatever id:
-    its errors would be those of the fit itself."""
+    """Check that no log of the validation has the positions of a log of the fit.
+
+    Raises:
+        InvalidProblem: the same log is in both; the validation would repeat the errors of the fit.
+    """
     if any(np.array_equal(other.q, each.q) for other in others for each in fitted):
         raise InvalidProblem(
             "validate",
-            "A log that validates the figures is one of `logs`, too: name another log, or leave "
-            "`validate` out, and whole motions are held out of the fit.",
+            "A log of `validate` is also in `logs`. Name another log, or leave out `validate`: "
+            "some motions of `logs` are then held out of the fit for the validation.",
         )
 
 

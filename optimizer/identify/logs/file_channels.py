@@ -171,7 +171,7 @@ def _check_degrees(q: Array, options: LogOptions, remarks: list[str]) -> None:
     """Remark on positions (n, joints) [rad] so small that they were not given in degrees."""
     if options.units == "deg" and np.abs(q).max() <= TWO_PI * pi / 180 and np.ptp(q, axis=0).any():
         remarks.append(
-            "No position is above 6.3 degrees: they look like radians; then leave units=deg out."
+            "No position exceeds 6.3 degrees. If the positions are in radians, leave out units=deg."
         )
 
 
