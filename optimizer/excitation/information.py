@@ -64,8 +64,11 @@ class Information:
         Args:
             samples: number of independent measurements in all rows together.
         """
-        scale = np.linalg.norm(self.columns, axis=0)
+        size = np.linalg.norm(self.columns, axis=0)
+        # a motion without any effect of a parameter has a column of zeros
+        scale = np.where(size > 0, size, 1.0)
         # not by the inverse of the information, whose condition is the square of the columns'
         _, values, vectors = np.linalg.svd(self.columns / scale, full_matrices=False)
+        values = np.maximum(values, np.finfo(float).eps * values.max())
         spread = np.linalg.norm(vectors / values[:, None], axis=0) / scale
         return np.asarray(spread * np.sqrt(len(self.columns) / samples))

@@ -254,3 +254,14 @@ def test_a_centre_out_of_range_is_refused() -> None:
     with pytest.raises(OutsideLimits) as caught:
         ExcitationProblem(arm=ARM, centre=np.full(6, 10.0))
     assert caught.value.target == "centre"
+
+
+@pytest.mark.parametrize("other", [0.0, 1.0], ids=["without effect", "as another one"])
+def test_a_parameter_that_the_motion_does_not_determine_is_predicted_as_unknown(
+    other: float,
+) -> None:
+    columns = np.random.default_rng(0).normal(size=(50, 3))
+    columns[:, 1] = other * columns[:, 0]
+    deviations = Information(columns).deviations(50)
+    assert np.isfinite(deviations).all()
+    assert deviations[1] > 1e12 and deviations[2] < 1.0
