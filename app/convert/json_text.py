@@ -52,8 +52,9 @@ def parsed_json(body: bytes) -> Any:
     """The value of a JSON text in UTF-8. Raises InvalidRequest."""
     if not body.strip():
         raise _refused(EMPTY)
-    if body.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise _refused("The body is UTF-16: encode it in UTF-8")
+    # JSON begins with two characters of ASCII, so a zero byte is a part of a wider character
+    if body.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in body[:4]:
+        raise _refused("The body is UTF-16 or UTF-32: encode it in UTF-8")
     try:
         return jiter.from_json(body.removeprefix(b"\xef\xbb\xbf"), catch_duplicate_keys=True)
     except ValueError as error:

@@ -9,6 +9,7 @@ import uuid
 from contextlib import nullcontext
 from functools import partial
 from typing import Any
+from urllib.parse import unquote
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import ClientDisconnect, Request
@@ -27,6 +28,7 @@ logger = logging.getLogger("app.request")
 
 METRICS = "/metrics"
 REQUEST_ID_HEADER = "X-Request-ID"
+_ABSOLUTE_FORM = re.compile(rb"(?i:https?)://([^/]*)(/.*)?")
 _SANE_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _CLIENT_CLOSED_REQUEST = 499
 """Logged status of a request with a closed connection, by nginx's convention; never sent."""
@@ -57,6 +59,7 @@ class RequestContext:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
+        scope = _in_origin_form(scope)
         given = Headers(scope=scope).get(REQUEST_ID_HEADER, "")
         state = scope.setdefault("state", {})
         state["id"] = given if _SANE_ID.fullmatch(given) else str(uuid.uuid4())
@@ -110,6 +113,25 @@ class RequestContext:
         # probes come every few seconds
         level = logging.DEBUG if scope["path"] in (*PROBES, METRICS) else logging.INFO
         logger.log(level, "request", extra=exchange.asked | told | {"duration": round(duration, 6)})
+
+
+def _in_origin_form(scope: Scope) -> Scope:
+    """The scope of a request with the target `http://host/path`, as of `/path` with this host.
+
+    Clients behind a proxy send such targets. The host of the target replaces the header (RFC 9112,
+    section 3.2.2).
+    """
+    found = _ABSOLUTE_FORM.fullmatch(scope.get("raw_path", b""))
+    if found is None:
+        return scope
+    host, path = found[1], found[2] or b"/"
+    others = [(name, value) for name, value in scope["headers"] if name != b"host"]
+    return {
+        **scope,
+        "path": unquote(path.decode("ascii")),
+        "raw_path": path,
+        "headers": [(b"host", host), *others],
+    }
 
 
 class _HeadSent(Exception):

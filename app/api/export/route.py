@@ -28,9 +28,8 @@ _FORMAT = Path(
     description="The format. "
     + " ".join(f"`{name}`: {each.meaning}" for name, each in FORMATS.items()),
     examples=["urscript"],
-    json_schema_extra={
-        "x-enum-descriptions": {name: each.meaning for name, each in FORMATS.items()}
-    },
+    # in the order of the enum, as the generators of clients read it
+    json_schema_extra={"x-enum-descriptions": [each.meaning for each in FORMATS.values()]},
 )
 _MEDIA_TYPES = (
     "text/plain",

@@ -106,6 +106,19 @@ def test_http_1_0_has_no_host(server: Server) -> None:
     )
 
 
+def test_the_target_of_a_client_behind_a_proxy(server: Server) -> None:
+    """Its host counts, not the header's (RFC 9112, section 3.2.2)."""
+    own, foreign = (
+        asked(server, lines(f"GET {target} HTTP/1.1", f"Host: {header}"))
+        for target, header in (
+            ("HTTP://localhost:80/robots/ur5e%2Furdf?", "evil.example"),
+            ("http://evil.example/robots", "localhost"),
+        )
+    )
+    assert own.status == 200 and b"<robot" in own.body
+    assert foreign.problem["type"] == "/problems/wrong-host"
+
+
 @pytest.mark.parametrize("declared", ["", " ", ";charset=utf-8"])
 def test_an_empty_content_type_is_none(server: Server, declared: str) -> None:
     head = (

@@ -348,6 +348,9 @@ def test_a_shape_is_named_by_the_index_of_its_obstacle(
         (b'{"duration": 01}', "leading zeros"),
         (b'{"duration" 1}', "a colon is expected"),
         ('{"robot": "ur5e"}'.encode("utf-16"), "UTF-16"),
+        # as a StringContent of .NET with Encoding.Unicode
+        ('{"robot": "ur5e"}'.encode("utf-16-le"), "UTF-16"),
+        ('{"robot": "ur5e"}'.encode("utf-32-be"), "UTF-32"),
         (b'{"robot": "\xe4"}', "line 1, column 12: this is not UTF-8"),
         (b'{"robot": "\\ud800"}', "half of a character"),
         (b'{"robot": "C:\\x"}', "backslash"),
