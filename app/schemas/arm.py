@@ -89,8 +89,7 @@ Speed = Annotated[float, Field(ge=1e-3, le=1e3)]
 
 
 class PositionLimits(Request):
-    """A narrower joint range, at least 10 mrad for arms of more than six joints. One number
-    applies to every joint, a list has one per joint."""
+    """A narrower joint range. One number applies to every joint, a list has one per joint."""
 
     lower: AnglePerJoint | None = described("Smallest joint position.", "rad", -3.0, default=None)
     upper: AnglePerJoint | None = described("Largest joint position.", "rad", 3.0, default=None)

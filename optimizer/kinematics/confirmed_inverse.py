@@ -22,7 +22,11 @@ from joulepath.optimizer.kinematics.ik_solutions import (
 from joulepath.optimizer.kinematics.isolated import distinct
 from joulepath.optimizer.kinematics.reach import REACH, at_the_edge, out_of_reach
 from joulepath.optimizer.kinematics.self_motion import SelfMotion, is_point, spread
-from joulepath.optimizer.kinematics.self_motion_members import up_to_limits, without_gaps
+from joulepath.optimizer.kinematics.self_motion_members import (
+    one_in_each_part,
+    up_to_limits,
+    without_gaps,
+)
 from joulepath.optimizer.kinematics.seven import redundant_curve, traced_curve
 from joulepath.optimizer.kinematics.seven.redundant_curve import RedundantCurve
 from joulepath.optimizer.kinematics.seven.traced_curve import TracedCurve
@@ -45,10 +49,6 @@ class InverseSettings:
     gapless_members: int = 16
     """Number of members from which on gaps between members are filled, too: the members then
     represent the whole curve.
-    """
-    search_members: int = 128
-    """Number of members among which one within the limits is sought if the regular members are
-    outside.
     """
 
 
@@ -321,22 +321,19 @@ def _unrepresented(
     motions: Sequence[SelfMotion], reached: _Reached, limits: Limits
 ) -> list[tuple[SelfMotion, Array]]:
     """Self-motions without a reached configuration within the limits, each with a member (1, nq)
-    [rad] inside.
+    [rad] of every part inside.
 
     The regular members of a self-motion may all be outside, and a shared end may be kept as a
     member of the other self-motion. Self-motions wholly outside are left out.
     """
     inside = nearest_turns(reached.q, limits)[1]
     represented = set(compress(reached.curves, inside))
-    found = list[tuple[SelfMotion, Array]]()
-    for motion in motions:
-        if motion not in represented and not is_point(motion):
-            # Ends inside the limits are already there, perhaps as ends of another self-motion.
-            q = motion.at(spread(motion, INVERSE.search_members)[1:-1])
-            within = np.flatnonzero(nearest_turns(q, limits)[1])
-            if len(within):
-                found.append((motion, q[within[[len(within) // 2]]]))
-    return found
+    return [
+        (motion, q[None])
+        for motion in motions
+        if motion not in represented and not is_point(motion)
+        for q in one_in_each_part(motion, limits)
+    ]
 
 
 def _orthonormal(T: Array) -> Array:

@@ -31,6 +31,17 @@ class SelfMotionSettings:
     """Number of members between one within limits and its neighbour outside, of which the last one
     inside is taken. From there, ends slide to the limit."""
 
+    first_parts: int = 128
+    """Number of parts of a self-motion whose middles are tested if its members are outside the
+    limits.
+    """
+    part_halvings: int = 24
+    """Largest number of times a part is halved whose box meets the limits while no middle is
+    inside: down to 3e-9 rad.
+    """
+    most_parts: int = 2048
+    """Number of parts above which none is halved: at a singularity, boxes may not shrink."""
+
 
 SELF_MOTION = SelfMotionSettings()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import ceil
+
 import numpy as np
 
 from joulepath.models.robot import Array, Limits, Mask
@@ -71,6 +73,46 @@ def up_to_limits(
     is_new = last != parameters[within]
     last, after = last[is_new], crossings[is_new] + 1
     return np.insert(parameters, after, last), np.insert(q, after, motion.at(last), axis=0)
+
+
+def one_in_each_part(motion: SelfMotion, limits: Limits) -> Array:
+    """Members of a self-motion within limits, one of each part inside.
+
+    A part may be as short as the range of one joint. The arcs are halved wherever their boxes meet
+    the limits, until a middle is inside. Adjacent cells count as one part.
+
+    Args:
+        motion: self-motion.
+        limits: position limits.
+
+    Returns:
+        The members (m, nq) [rad], m = 0 for a self-motion outside the limits.
+    """
+    centre, width = (limits.q_min + limits.q_max) / 2, (limits.q_max - limits.q_min) / 2
+    width = np.where(width < np.pi, width, np.inf)
+    length = sum(upper - lower for lower, upper in motion.arcs)
+    ends = [
+        np.linspace(*arc, 1 + ceil(SELF_MOTION.first_parts * (arc[1] - arc[0]) / length))
+        for arc in sorted(motion.arcs)
+    ]
+    low, high = np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends])
+    found = [np.zeros((0, len(centre)))]
+    for _ in range(SELF_MOTION.part_halvings):
+        middle = (low + high) / 2
+        box, half = motion.boxes(middle, (high - low) / 2)
+        meets = (np.abs(wrapped(box - centre)) <= width + half).all(axis=1)
+        low, high, middle = low[meets], high[meets], middle[meets]
+        if not 0 < len(low) <= SELF_MOTION.most_parts:
+            break
+        q = motion.at(middle)
+        inside = np.array(nearest_turns(q, limits)[1], dtype=bool)
+        part = np.append(0, np.cumsum(low[1:] > high[:-1]))
+        seen, first = np.unique(part[inside], return_index=True)
+        found.append(q[inside][first])
+        left = ~np.isin(part, seen)
+        low, middle, high = low[left], middle[left], high[left]
+        low, high = np.stack([low, middle], 1).ravel(), np.stack([middle, high], 1).ravel()
+    return np.vstack(found)
 
 
 def _has_next(motion: SelfMotion, parameters: Array) -> Mask:

@@ -25,6 +25,15 @@ class TracedLimitsSettings:
 
     parts: int = 8
     """Number of parts of an undecided segment whose ends are tested against the limits."""
+    divisions: int = 9
+    """Largest number of times a segment is divided into parts, in search of parts that cross the
+    range of a joint between two tested points: down to 1e-8 of the segment.
+    """
+    bulge: float = 0.2
+    """Largest distance of a cubic from the chord of a part, relative to its largest second
+    difference: 1/8 of the second difference at an end, which the linear second differences of 8
+    parts exceed by at most a third.
+    """
     steps: int = 16
     """Largest number of steps towards a crossing that Newton's method does not find."""
     near: float = 0.05
@@ -64,6 +73,64 @@ class _JointRanges:
         away = np.abs(wrapped(angles - self.middle)) - self.half
         return np.asarray(np.maximum.reduce(away, axis=-1))
 
+    def may_enter(self, angles: Array) -> Mask:
+        """Mask (n, parts) of the parts of cubics that may be within all limits although both of
+        their ends are outside, from angles (n, parts + 1, m) [rad] at the ends of the parts.
+        """
+        bend = np.diff(angles, 2, axis=1)
+        bulge = SETTINGS.bulge * np.maximum.reduce(np.abs(bend), axis=1)[:, None]
+        own = wrapped(angles - self.middle)
+        away = np.abs(own) - self.half
+        before, after = own[:, :-1], own[:, 1:]
+        across = (before * after < 0) & (np.abs(after - before) < np.pi)
+        nearest = np.minimum(away[:, :-1], away[:, 1:]) - bulge
+        outside = np.maximum.reduce(away, axis=2) > 0
+        passed_by = np.logical_or.reduce((nearest > 0) & ~across, axis=2)
+        return np.asarray(outside[:, :-1] & outside[:, 1:] & ~passed_by)
+
+
+@dataclass(frozen=True, eq=False)
+class _Crossed:
+    """Parts of segments that cross limits.
+
+    Shares `low` to `low + size` (n,) of the segments after the points k (n,) are divided into equal
+    parts; the cubics are beyond the limits by `excess` (n, parts + 1) [rad] at the ends of the
+    parts; the limit is crossed in `part` (n,).
+    """
+
+    k: Rows
+    low: Array
+    size: Array
+    part: Rows
+    excess: Array
+
+    @classmethod
+    def in_segments(cls, stack: TracedCurveStack, limits: _JointRanges, k: Rows) -> _Crossed:
+        """All parts of the segments after the points k (n,) that cross limits, in order."""
+        angles = stack.at_each(k, PART_WEIGHTS, limits.joints)
+        low, size, found = np.zeros(len(k)), np.ones(len(k)), []
+        for division in range(1, SETTINGS.divisions + 1):
+            excess = limits.beyond(angles)
+            held = excess <= 0
+            row, part = np.nonzero(held[:, 1:] != held[:, :-1])
+            found.append((k[row], low[row], size[row], part, excess[row]))
+            row, part = np.nonzero(limits.may_enter(angles))
+            if not len(row) or division == SETTINGS.divisions:
+                break
+            size = size[row] / SETTINGS.parts
+            k, low = k[row], low[row] + size * part
+            shares = low[:, None] + size[:, None] * np.linspace(0.0, 1.0, SETTINGS.parts + 1)
+            q = stack.at(k.repeat(shares.shape[1]), shares.ravel())
+            angles = q[:, limits.joints].reshape(*shares.shape, -1)
+        columns = [np.concatenate(column) for column in zip(*found, strict=True)]
+        k, low, size, part, _ = columns
+        order = np.lexsort((low + size * part / SETTINGS.parts, k))
+        return cls(*(column[order] for column in columns))
+
+    def share(self, root: Array) -> Array:
+        """Shares (n,) of the segments at shares `root` (n,) of the crossed parts."""
+        return self.low + self.size * (self.part + root) / SETTINGS.parts
+
 
 def cut_to_limits(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[TracedCurve]:
     """Curves of one pose, cut to the limits (nq,) [rad] up to full turns; curves wholly outside are
@@ -86,20 +153,18 @@ def _cut(curves: Sequence[TracedCurve], limits: _JointRanges) -> list[list[tuple
     inside, undecided = _by_hull(stack, limits)
     at, segment = np.zeros(0), np.zeros(0, dtype=np.intp)
     if len(undecided):
-        excess = limits.beyond(stack.at_each(undecided, PART_WEIGHTS, limits.joints))
-        held = excess <= 0
-        row, part = np.nonzero(held[:, 1:] != held[:, :-1])
-        segment = undecided[row]
+        crossed = _Crossed.in_segments(stack, limits, undecided)
+        segment = crossed.k
         if len(segment):
-            at = _crossings(curves[0], limits, segment, part, excess[row])
+            at = _crossings(curves[0], limits, crossed)
     gap = stack.knots[np.minimum(segment + 1, len(inside) - 1)] - stack.knots[segment]
     ends = stack.knots[segment] + at * gap
     # Crossings are sorted by segments, and so by curves.
-    crossed, behind = ends.tolist(), [0, *np.searchsorted(segment, stack.last).tolist()]
+    places, behind = ends.tolist(), [0, *np.searchsorted(segment, stack.last).tolist()]
     first, last = inside[stack.first].tolist(), inside[stack.last].tolist()
     return [
         _arcs(
-            each, crossed[behind[each.row] : behind[each.row + 1]], first[each.row], last[each.row]
+            each, places[behind[each.row] : behind[each.row + 1]], first[each.row], last[each.row]
         )
         for each in curves
     ]
@@ -153,38 +218,28 @@ def _arcs(
     return arcs
 
 
-def _crossings(one: TracedCurve, limits: _JointRanges, k: Rows, part: Rows, excess: Array) -> Array:
-    """Shares of segments at which the curves cross limits.
-
-    Args:
-        one: any curve of the pose.
-        limits: ranges of the joints.
-        k: points that begin the segments, shape (n,).
-        part: part of each segment with the crossing, shape (n,).
-        excess: angles of the cubics beyond the limits at the ends of all parts, shape (n, parts +
-            1) [rad].
-
-    Returns:
-        The shares (n,).
-    """
-    stack, rows = one.stack, np.arange(len(k))
+def _crossings(one: TracedCurve, limits: _JointRanges, crossed: _Crossed) -> Array:
+    """Shares (n,) of segments at which the curves of the pose of `one` cross limits."""
+    k, part, rows = crossed.k, crossed.part, np.arange(len(crossed.k))
     # A parabola through the ends of the part and of an adjacent one crosses the limit near the
     # crossing of the curve.
-    low, high = excess[rows, part], excess[rows, part + 1]
+    low, high = crossed.excess[rows, part], crossed.excess[rows, part + 1]
     beside = np.where(part < SETTINGS.parts - 1, part + 2, part - 1)
     chord = low / (low - high)
-    bend = (excess[rows, beside] + low + high) / 2 - 1.5 * np.where(beside > part, high, low)
+    bend = (crossed.excess[rows, beside] + low + high) / 2
+    bend -= 1.5 * np.where(beside > part, high, low)
     root = np.minimum(np.maximum(chord - bend * chord * (chord - 1) / (high - low), 0.0), 1.0)
-    near = stack.at(k, (part + root) / SETTINGS.parts)
+    near = one.stack.at(k, crossed.share(root))
     q, exact = _on_limits(one, limits, near)
-    at = stack.shares_across(k, (part + root) / SETTINGS.parts, q)
+    at = one.stack.shares_across(k, crossed.share(root), q)
     exact &= (at >= 0) & (at <= 1) & (np.maximum.reduce(np.abs(near - q), axis=1) < SETTINGS.near)
     rest = np.flatnonzero(~exact)
     if len(rest):
+        brackets = np.array([crossed.share(np.zeros(len(k))), crossed.share(np.ones(len(k)))])
         # The target is inside the limits by half of the rounding tolerance.
         at[rest] = _zeros(
             lambda share: limits.excess(on_curve(one, k[rest], share)) + SETTINGS.rounding / 2,
-            np.array([part[rest], part[rest] + 1]) / SETTINGS.parts,
+            brackets[:, rest],
             low[rest] <= 0,
         )
     return at
