@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { parsePose, parseTable, type Reading } from "../src/store/parsePose";
+import { parseAlike, parsePose, type Reading } from "../src/store/parsePose";
+import { parseTable, type Table } from "../src/store/tables";
 
 const readings = (text: string, prefer?: Reading["kind"], joints = 6): Reading[] => {
   const parsed = parsePose(text, joints, prefer);
@@ -72,8 +73,10 @@ describe("joint positions", () => {
       "joints in degrees",
     ]);
   });
-  it("of movej are rad", () => {
-    expect(readings("movej([0, -1.5, 1.5, -1.5, -1.5, 0])")).toHaveLength(1);
+  it("of movej are rad, without its speeds", () => {
+    const [only, ...others] = readings("movej([0, -1.5, 1.5, -1.5, -1.5, 0], a=1.4, v=1.05)");
+    expect(others).toEqual([]);
+    expect(only!.values).toEqual([0, -1.5, 1.5, -1.5, -1.5, 0]);
   });
   it("are those of an arm of seven", () => {
     expect(readings("[0, -90, 90, -90, -90, 0, 30]", undefined, 7)).toHaveLength(1);
@@ -90,13 +93,59 @@ it("what is far away says so", () => {
   expect(why("1e999 0 0 0 0 0")).toContain("Numbers found: 5.");
 });
 
-it("a table has names and rows", () => {
-  const rows = parseTable(
-    "name;x;y;z;rx;ry;rz\nbin;-420;280;100;0;3.142;0\nshelf;-350;-520;450;1.571;0;0",
-  );
-  expect(rows).toEqual([
-    { name: "bin", text: "-420 ; 280 ; 100 ; 0 ; 3.142 ; 0" },
-    { name: "shelf", text: "-350 ; -520 ; 450 ; 1.571 ; 0 ; 0" },
-  ]);
-  expect(parseTable("-420;280;100;0;3.142;0")).toBeNull();
+describe("a table", () => {
+  const table = (text: string) => parseTable(text) as Table;
+  const why = (text: string) => (parseTable(text) as { why: string }).why;
+  it("has names and rows", () => {
+    const { rows, choices } = table(
+      "name;x;y;z;rx;ry;rz\nbin;-420;280;100;0;3.142;0\nshelf;-350;-520;450;1.571;0;0",
+    );
+    expect(rows.map(({ name }) => name)).toEqual(["bin", "shelf"]);
+    expect(choices[0]!.rows[1]!.values).toEqual([-0.35, -0.52, 0.45, 1.571, 0, 0]);
+    expect(parseTable("-420;280;100;0;3.142;0")).toBeNull();
+  });
+  it("of a spreadsheet has decimal commas between semicolons or tabs", () => {
+    for (const mark of [";", "\t"]) {
+      const line = ["pick", "-420,5", "280", "100", "0", "3,1416", "0"].join(mark);
+      const [row] = table(`${line}\n${line}`).choices[0]!.rows;
+      expect(row!.values).toEqual([-0.4205, 0.28, 0.1, 0, 3.1416, 0]);
+    }
+  });
+  it("takes units from its head", () => {
+    const { choices } = table(
+      "name;x [mm];y;z;rx [rad];ry;rz\na;-420;280;100;0;3.1;0\nb;-420;280;200;0;3.1;0",
+    );
+    expect(choices.map(({ echo }) => echo)).toEqual(["pose in mm and RX RY RZ in rad"]);
+  });
+  it("without a row is refused by the name of the row", () => {
+    const rows = (third: string) => `a;-420;280;100;0;3;0\nb;-420;280;90;0;3;0\n${third}`;
+    expect(why(rows("c;-420;280;;0;3;0"))).toMatch(/^Row 3 \(c\): Numbers found: 5/);
+    expect(why(rows("c;-42000;280;0;0;3;0"))).toMatch(/^Row 3 \(c\): .*check the units/);
+  });
+  it("is asked about as a whole", () => {
+    // the first row has no turn, and the second is no vector in rad
+    const degrees = table("a;-420;280;100;0;0;0\nb;-420;280;100;90;0;45").choices;
+    expect(degrees.map(({ echo }) => echo)).toEqual([
+      "pose in mm and RX RY RZ in degrees",
+      "pose in mm and roll, pitch, yaw in degrees",
+    ]);
+    // the second row can only be degrees, so the first one is
+    const [only, ...others] = parseChoices("q1 0 1 1 1 1 0", "q1 0 -90 90 0 0 0");
+    expect(others).toEqual([]);
+    expect(only!.echo).toBe("joints in degrees");
+  });
+  it("may be a program", () => {
+    const { choices } = table(
+      "set_payload(2, [0, 0, 0.05])\nmovej([0, -1.5, 1.5, -1.5, -1.5, 0], a=1.4, v=1.05)\n" +
+        "sleep(0.5)\nmovel(p[-0.42, 0.28, 0.1, 0, 3.1416, 0], a=1.2, v=0.25)",
+    );
+    expect(choices).toHaveLength(1);
+    expect(choices[0]!.rows.map(({ kind }) => kind)).toEqual(["joints", "pose"]);
+    expect(choices[0]!.rows[1]!.values[0]).toBe(-0.42);
+  });
 });
+
+function parseChoices(...texts: string[]) {
+  const parsed = parseAlike(texts);
+  return "why" in parsed ? [] : parsed.choices;
+}

@@ -23,14 +23,14 @@ export function NewJob({ onClose }: { onClose: () => void }) {
   const [busy, setBusy] = useState(false);
   const joints = robotNow.value?.joints.length ?? 6;
   const read = text.trim() ? parseMoves(text, joints) : null;
-  const readings = read && "readings" in read ? read.readings : [];
-  const reading = readings.length === 1 ? readings[0] : readings[chosen];
+  const choices = read && "choices" in read ? read.choices : [];
+  const choice = choices.length === 1 ? choices[0] : choices[chosen];
   const moves = read && "moves" in read ? read.moves : [];
   const start = async () => {
     setBusy(true);
     setWhy("");
     try {
-      const requests = requestsOf(moves, reading!, request.value, joints);
+      const requests = requestsOf(moves, choice!, request.value);
       const bodies = requests.map((each, k) => ({
         name: moveName(moves[k]!),
         optimize: { ...each, candidates: "none" },
@@ -71,7 +71,7 @@ export function NewJob({ onClose }: { onClose: () => void }) {
           <Button
             kind="primary"
             id="start-job"
-            disabled={!reading || !moves.length || busy}
+            disabled={!choice || !moves.length || busy}
             onClick={start}
           >
             Start {moves.length === 1 ? "1 move" : `${moves.length || ""} moves`}
@@ -129,20 +129,20 @@ export function NewJob({ onClose }: { onClose: () => void }) {
             {why}
           </p>
         )}
-        {readings.length > 1 && (
+        {choices.length > 1 && (
           <div class="row" id="job-readings">
             <b>How is it meant?</b>
-            {readings.map(({ echo }, k) => (
+            {choices.map(({ echo }, k) => (
               <Button key={echo} small pressed={k === chosen} onClick={() => setChosen(k)}>
                 {echo}
               </Button>
             ))}
           </div>
         )}
-        {reading && moves.length > 0 && (
+        {choice && moves.length > 0 && (
           <>
             <p>
-              {moves.length} moves, read as {reading.echo}.
+              {moves.length} moves, read as {choice.echo}.
             </p>
             <ul class="hint">
               {moves.slice(0, SHOWN).map((move, k) => (

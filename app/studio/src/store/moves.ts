@@ -1,7 +1,7 @@
 // Tables of moves, as they become a job: from where to where, with what.
 import { gripped } from "./load";
-import { parsePose, type Reading } from "./parsePose";
-import { poseOfSix } from "./request";
+import { parseAlike, targetOf, type Choice } from "./parsePose";
+import { cellsOf, isNumber, unitsOf } from "./tables";
 import type { ApiRequest, Payload } from "./types";
 import { parseNumber } from "./units";
 
@@ -14,16 +14,13 @@ export interface Move {
   goal: string;
 }
 
-export type MovesRead = { moves: Move[]; readings: Reading[] } | { why: string };
+export type MovesRead = { moves: Move[]; choices: Choice[] } | { why: string };
 
 const LONGEST_NAME = 200;
 
 /** The name of a move in its job, without characters that do not show. */
 export const moveName = ({ from, to }: Move): string =>
   `${from} to ${to}`.replace(/\p{C}/gu, "").slice(0, LONGEST_NAME);
-
-const SEPARATOR = /[;,\t]/;
-const isNumber = (cell: string) => /^[+\-−]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(cell);
 
 /**
  * Reads a table with one move in a row: names, kg, six numbers of the start, six of the goal; or
@@ -32,7 +29,7 @@ const isNumber = (cell: string) => /^[+\-−]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.t
 export function parseMoves(text: string, joints: number): MovesRead {
   const lines = text
     .split(/\r?\n/)
-    .map((line) => line.split(SEPARATOR).map((cell) => cell.trim().replace(/^"|"$/g, "")))
+    .map(cellsOf)
     .filter((cells) => cells.some(Boolean));
   const [first] = lines;
   if (!first) return { why: "Paste a table: one move in a row." };
@@ -56,8 +53,13 @@ export function parseMoves(text: string, joints: number): MovesRead {
     return {
       why: `${count} numbers are in a row: a move has 12 (6 of the start, 6 of the goal), a target 6.`,
     };
-  const parsed = parsePose(moves[0]!.start, joints);
-  return "why" in parsed ? parsed : { moves, readings: parsed.readings };
+  const parsed = parseAlike(
+    moves.flatMap(({ start, goal }) => [start, goal]),
+    joints,
+  );
+  return "why" in parsed
+    ? { why: `${moveName(moves[Math.floor(parsed.row / 2)]!)}: ${parsed.why}` }
+    : { moves, choices: parsed.choices };
 }
 
 interface Row {
@@ -83,14 +85,6 @@ function rowOf(cells: string[], head: string[] | null): Row {
     odd: odd ?? null,
     numbers: rest.filter(isNumber).map((cell) => Number(cell.replace("−", "-"))),
   };
-}
-
-/** Units that a head names, as words that the reader of poses understands. */
-function unitsOf(head: string): string {
-  const length = /\bmm\b|_mm/.test(head) ? " mm" : /[[(_ ]m[\])\s]/.test(head) ? " m" : "";
-  const angle = /\bdeg|_deg|°/.test(head) ? " deg" : /\brad\b|_rad/.test(head) ? " rad" : "";
-  const kind = /\bq_?1|\bj_?1|joint/.test(head) ? " q1" : /\brx\b|rx[_ [(]/.test(head) ? " rx" : "";
-  return `${length}${angle}${kind}`;
 }
 
 const textOf = (numbers: number[], units: string) => `${numbers.join(" ; ")}${units}`;
@@ -136,28 +130,13 @@ const OWN = [
   "dwell",
 ];
 
-/** The requests of a job: each move in the cell. Throws Error with the row that cannot be read. */
-export function requestsOf(
-  moves: Move[],
-  reading: Reading,
-  cell: ApiRequest,
-  joints: number,
-): ApiRequest[] {
+/** The requests of a job: each move in the cell, read as chosen. */
+export function requestsOf(moves: Move[], { rows }: Choice, cell: ApiRequest): ApiRequest[] {
   const shared = Object.fromEntries(Object.entries(cell).filter(([name]) => !OWN.includes(name)));
-  const targetOf = (text: string, row: number) => {
-    const parsed = parsePose(text, joints, reading.kind);
-    const own =
-      "readings" in parsed
-        ? (parsed.readings.find(({ echo }) => echo === reading.echo) ?? parsed.readings[0])
-        : null;
-    if (!own || own.kind !== reading.kind)
-      throw new Error(`Row ${row + 1} cannot be read as ${reading.echo}.`);
-    return own.kind === "joints" ? { q: own.values } : { pose: poseOfSix(own.values) };
-  };
-  return moves.map(({ mass, start, goal }, k) => ({
+  return moves.map(({ mass }, k) => ({
     ...shared,
-    start: targetOf(start, k),
-    goal: targetOf(goal, k),
+    start: targetOf(rows[2 * k]!),
+    goal: targetOf(rows[2 * k + 1]!),
     ...(mass === null ? {} : { payload: loadOf(mass, cell) }),
   }));
 }

@@ -1,7 +1,9 @@
-// Reads what is pasted as a pose or as joint positions. What can be meant in two ways is asked,
-// never guessed.
+// Reads what is pasted as poses or as joint positions. What can be meant in two ways is asked, never
+// guessed.
 import { Euler, Quaternion } from "three";
 import { rotvecOf } from "./chain";
+import { poseOfSix } from "./request";
+import type { Pose } from "./types";
 
 export interface Reading {
   kind: "pose" | "joints";
@@ -11,7 +13,20 @@ export interface Reading {
   echo: string;
 }
 
+/** The target of a request that was read. */
+export const targetOf = ({ kind, values }: Reading): { q: number[] } | { pose: Pose } =>
+  kind === "joints" ? { q: values } : { pose: poseOfSix(values) };
+
 export type Parsed = { readings: Reading[] } | { why: string };
+
+/** One way to read all rows of a table. */
+export interface Choice {
+  echo: string;
+  /** The readings of the rows, in order. */
+  rows: Reading[];
+}
+
+export type ParsedRows = { choices: Choice[] } | { why: string; row: number };
 
 const DEGREE = Math.PI / 180;
 const TURN = 2 * Math.PI + 0.01;
@@ -32,11 +47,67 @@ const LENGTHS = [
  * row it goes to.
  */
 export function parsePose(text: string, joints = 6, prefer?: Reading["kind"]): Parsed {
+  const parsed = parseAlike([text], joints, prefer);
+  return "why" in parsed
+    ? { why: parsed.why }
+    : { readings: parsed.choices.map(({ rows }) => rows[0]!) };
+}
+
+/**
+ * Every way in which all of several texts can be read alike. A text with one reading, such as a line
+ * of a program, is read so whatever the others are.
+ */
+export function parseAlike(texts: string[], joints = 6, prefer?: Reading["kind"]): ParsedRows {
+  const all: Reading[][] = [];
+  for (const [row, text] of texts.entries()) {
+    const found = readingsOf(text, joints, prefer);
+    if ("why" in found) return { ...found, row };
+    all.push(found.readings);
+  }
+  const echoesOf = (readings: Reading[]) => readings.map(({ echo }) => echo);
+  const clear = all.filter(({ length }) => length === 1).flatMap(echoesOf);
+  const open = all.filter(({ length }) => length > 1);
+  let shared = echoesOf(open[0] ?? all[0]!.slice(0, 1));
+  for (const readings of open) {
+    shared = shared.filter((echo) => echoesOf(readings).includes(echo));
+    if (!shared.length)
+      return { why: "It cannot be read like the rows above it.", row: all.indexOf(readings) };
+  }
+  const likely = shared.filter((echo) => clear.includes(echo));
+  const echoes = likely.length ? likely : shared;
+  const choices = echoes.map((echo) => ({
+    echo,
+    rows: all.map((readings) => readings.find((each) => each.echo === echo) ?? readings[0]!),
+  }));
+  return { choices: different(choices.filter(isLikely)) };
+}
+
+/** Choices with different values. */
+const different = (choices: Choice[]) =>
+  choices.filter(
+    (one, k) =>
+      !choices
+        .slice(0, k)
+        .some((two) =>
+          one.rows.every(
+            (row, n) => row.kind === two.rows[n]!.kind && same(row.values, two.rows[n]!.values),
+          ),
+        ),
+  );
+
+/** Angles that can all be radians are not taken for roll, pitch and yaw in degrees. */
+const isLikely = ({ echo }: Choice, _: number, all: Choice[]) =>
+  !echo.endsWith(RPY) || !all.some((other) => other.echo === echo.replace(RPY, RADIANS));
+
+const RADIANS = "RX RY RZ in rad";
+const RPY = "roll, pitch, yaw in degrees";
+
+function readingsOf(text: string, joints: number, prefer?: Reading["kind"]): Parsed {
   const numbers = numbersOf(text);
   if (!numbers.length)
     return { why: "No number was found: paste p[…], six numbers or joint positions." };
   const asPose = /\bp\s*\[/i.test(text) || /\br[xyz]\b|\bx\b|\brpy\b|\broll\b/i.test(text);
-  const asJoints = /\b(?:j|q|joint ?)1\b|\bbase\b|\bshoulder\b|\bmovej\s*\(\s*\[/i.test(text);
+  const asJoints = /\b(?:j|q|joint ?)1\b|\bbase\b|\bshoulder\b/i.test(text) || MOVE.test(text);
   const poses = asJoints || numbers.length !== 6 ? [] : posesOf(text, numbers);
   const angles = asPose || numbers.length !== joints ? [] : jointsOf(text, numbers, joints);
   const readings = choose(poses, angles, prefer);
@@ -47,6 +118,9 @@ export function parsePose(text: string, joints = 6, prefer?: Reading["kind"]): P
     };
   return { why: farAway(numbers) };
 }
+
+/** Joint positions as an argument of a program's command. */
+const MOVE = /\b(?:move[jlp]|servoj)\s*\(\s*\[/i;
 
 function choose(poses: Reading[], joints: Reading[], prefer?: Reading["kind"]): Reading[] {
   if (prefer === "pose" && poses.length) return poses;
@@ -59,9 +133,12 @@ function farAway(numbers: number[]): string {
   return `As a pose in mm this is ${away.toFixed(1)} m away from the base: check the units.`;
 }
 
-function numbersOf(text: string): number[] {
+export function numbersOf(text: string): number[] {
+  // in a program, names and speeds with digits stand around the brackets
+  const lists = [...text.matchAll(/\[([^[\]]*)\]/g)].map(([, inside]) => inside!);
+  const bracketed = lists.length === 1 && lists[0]!.split(",").length >= 6 ? lists[0]! : text;
   // the digits of labels are no values
-  const plain = text.replace(LABEL, " ");
+  const plain = bracketed.replace(LABEL, " ");
   // where blanks or semicolons separate values, a comma between digits is a decimal sign
   const decimal = !plain.includes(".") && /\d,\d/.test(plain) && !/\d,\d+,/.test(plain);
   const read = decimal ? plain.replace(/(\d),(\d)/g, "$1.$2") : plain;
@@ -82,7 +159,7 @@ function posesOf(text: string, numbers: number[]): Reading[] {
     turnsOf(text, numbers.slice(3), script).map(({ rotvec, name }): Reading => ({
       kind: "pose",
       values: [...numbers.slice(0, 3).map((value) => value / length.inMetre), ...rotvec],
-      echo: `pose in ${length.name}${name ? ` and ${name}` : ""}`,
+      echo: `pose in ${length.name} and ${name}`,
     })),
   );
 }
@@ -93,20 +170,15 @@ function turnsOf(
   turn: number[],
   script: boolean,
 ): { rotvec: number[]; name: string }[] {
-  const radians = { rotvec: turn, name: "RX RY RZ in rad" };
+  const radians = { rotvec: turn, name: RADIANS };
   const vector = { rotvec: turn.map((value) => value * DEGREE), name: "RX RY RZ in degrees" };
-  const rpy = { rotvec: ofRpy(turn), name: "roll, pitch, yaw in degrees" };
-  if (turn.every((value) => value === 0)) return [{ ...radians, name: "" }];
-  const small = turn.every((value) => Math.abs(value) <= TURN);
+  const rpy = { rotvec: ofRpy(turn), name: RPY };
   if (script) return [radians];
-  const degrees = /\brpy\b|\broll\b/i.test(text)
-    ? [rpy]
-    : same(rpy.rotvec, vector.rotvec)
-      ? [vector]
-      : [vector, rpy];
+  const degrees = /\brpy\b|\broll\b/i.test(text) ? [rpy] : [vector, rpy];
   if (/°|\bdeg/.test(text)) return degrees;
   if (/\brad\b/.test(text)) return [radians];
-  return small ? [radians, vector] : degrees;
+  const small = turn.every((value) => Math.abs(value) <= TURN);
+  return small ? [radians, vector, rpy] : degrees;
 }
 
 const ofRpy = (turn: number[]) => {
@@ -125,36 +197,8 @@ function jointsOf(text: string, numbers: number[], joints: number): Reading[] {
     echo: "joints in degrees",
   };
   if (/°|\bdeg/.test(text)) return [degrees];
-  if (/\brad\b/.test(text) || /\bmovej\s*\(/i.test(text)) return [radians];
+  if (/\brad\b/.test(text) || MOVE.test(text)) return [radians];
   if (values.some((value) => Math.abs(value) > 400)) return [];
   if (values.some((value) => Math.abs(value) > TURN)) return [degrees];
   return [radians, degrees];
-}
-
-export interface TableRow {
-  name: string | null;
-  text: string;
-}
-
-/**
- * The rows of a pasted table (CSV, tab or semicolon separated) with at least two lines of six
- * numbers; null if it is none.
- */
-export function parseTable(text: string): TableRow[] | null {
-  const lines = text
-    .split(/\r?\n/)
-    .map((line) => line.trim())
-    .filter(Boolean);
-  const rows = lines.map(rowOf).filter((row) => row !== null);
-  return rows.length >= 2 ? rows : null;
-}
-
-function rowOf(line: string): TableRow | null {
-  const cells = line.split(/[;,\t]/).map((cell) => cell.trim());
-  const isNumber = (cell: string) => /^[+\-−]?[\d.]+(e[+-]?\d+)?\s*(mm|m|°|rad|deg)?$/i.test(cell);
-  const first = cells.findIndex(isNumber);
-  const named = first > 0 ? cells.slice(0, first).join(" ").replace(/["']/g, "").trim() : null;
-  const values = cells.slice(Math.max(0, first)).filter(isNumber);
-  if (values.length < 6) return numbersOf(line).length >= 6 ? { name: null, text: line } : null;
-  return { name: named || null, text: values.join(" ; ") };
 }

@@ -35,9 +35,9 @@ export function PasteBox() {
         <Note>
           <b>How is this meant?</b>
           <div class="readings" id="readings">
-            {asked.readings.map((reading) => (
-              <Button key={reading.echo} small onClick={() => answer(asked, reading)}>
-                {reading.echo}
+            {asked.choices.map((choice) => (
+              <Button key={choice.echo} small onClick={() => answer(asked, choice)}>
+                {choice.echo}
               </Button>
             ))}
             <Button small kind="quiet" onClick={() => (question.value = null)}>

@@ -3,15 +3,16 @@ import { signal } from "@preact/signals";
 import { robotNow } from "../picture/pictured";
 import { untyped } from "../picture/drag";
 import { withStop, withTarget } from "../store/edits";
-import { parsePose, parseTable, type Reading, type TableRow } from "../store/parsePose";
-import { kindOf, poseOfSix, rowsOf, targetAt, type Row } from "../store/request";
+import { parseAlike, targetOf, type Choice, type Reading } from "../store/parsePose";
+import { parseTable, type TableRow } from "../store/tables";
+import { rowsOf, targetAt, type Row } from "../store/request";
 import { edit, request, selected, toast } from "../store/state";
-import type { ApiRequest, Pose } from "../store/types";
+import type { ApiRequest } from "../store/types";
 
 export interface Question {
-  text: string;
   row: Row | null;
-  readings: Reading[];
+  choices: Choice[];
+  /** Null for a single target. */
   table: TableRow[] | null;
 }
 
@@ -20,8 +21,7 @@ export const pasteWrong = signal("");
 
 const joints = () => robotNow.value?.joints.length ?? 6;
 
-const targetOfReading = ({ kind, values }: Reading): { q: number[] } | { pose: Pose } =>
-  kind === "joints" ? { q: values } : { pose: poseOfSix(values) };
+const choicesOf = (text: string, prefer?: Reading["kind"]) => parseAlike([text], joints(), prefer);
 
 /** Takes a text that holds a whole target; false where it is a single number. */
 export function pasteInto(row: Row, text: string): boolean {
@@ -42,53 +42,47 @@ export function rowOfPaste(): Row | null {
 export function read(text: string, row: Row | null): boolean {
   pasteWrong.value = "";
   question.value = null;
-  const table = parseTable(text);
+  const table = parseTable(text, joints());
   const target = row && targetAt(request.value, row);
   const prefer = target?.kind === "pose" || target?.kind === "joints" ? target.kind : undefined;
-  const parsed = parsePose(table ? table[0]!.text : text, joints(), prefer);
+  const parsed = table ?? choicesOf(text, prefer);
   if ("why" in parsed) {
     pasteWrong.value = parsed.why;
     return false;
   }
-  const asked: Question = { text, row, readings: parsed.readings, table };
-  if (parsed.readings.length > 1) question.value = asked;
-  else answer(asked, parsed.readings[0]!);
+  const asked: Question = {
+    row,
+    choices: parsed.choices,
+    table: table && !("why" in table) ? table.rows : null,
+  };
+  if (parsed.choices.length > 1) question.value = asked;
+  else answer(asked, parsed.choices[0]!);
   return true;
 }
 
 /** Writes what was pasted as it is meant. */
-export function answer({ row, table }: Question, reading: Reading): void {
+export function answer({ row, table }: Question, { echo, rows }: Choice): void {
   question.value = null;
+  const targets = rows.map(targetOf);
   if (table) {
-    const [next, count] = withRows(request.value, table, reading);
-    edit(next);
-    toast.value = `${count} stops from the table, read as ${reading.echo}.`;
+    edit(withRows(request.value, table, targets));
+    toast.value = `${table.length} stops from the table, read as ${echo}.`;
     return;
   }
-  const target = targetOfReading(reading);
+  const [target] = targets;
   edit(
-    row ? withTarget(request.value, row, target) : withStop(request.value, target),
+    row ? withTarget(request.value, row, target!) : withStop(request.value, target),
     untyped(row?.pointer ?? "/none"),
   );
-  toast.value = `Read as ${reading.echo}.`;
+  toast.value = `Read as ${echo}.`;
 }
 
-/** The request with a stop for each row of a table that can be read in the same way. */
-function withRows(asked: ApiRequest, table: TableRow[], reading: Reading): [ApiRequest, number] {
-  let next = asked;
-  let count = 0;
-  for (const { name, text } of table) {
-    const parsed = parsePose(text, joints(), reading.kind);
-    const own =
-      "readings" in parsed
-        ? (parsed.readings.find(({ echo }) => echo === reading.echo) ?? parsed.readings[0])
-        : null;
-    if (!own) continue;
-    next = withStop(next, targetOfReading(own), name ?? "stop 1");
-    count += 1;
-  }
+/** The request with a stop for each row of a table. */
+function withRows(asked: ApiRequest, table: TableRow[], targets: unknown[]): ApiRequest {
+  const next = table.reduce(
+    (before, { name }, k) => withStop(before, targets[k], name ?? "stop 1"),
+    asked,
+  );
   // stops that were empty before have no place in the table
-  const stops =
-    kindOf(next) === "round" ? next.stops?.filter(({ target, path }) => target || path) : undefined;
-  return [stops ? { ...next, stops } : next, count];
+  return { ...next, stops: next.stops?.filter(({ target, path }) => target || path) };
 }
