@@ -34,3 +34,8 @@ it("a part is put down where it belongs, not at the end of the way back", () => 
   expect(at("place")).toMatch(/out\(3, False\)\n  sleep\(0.3\)\n  set_target_payload\(0,/);
   expect(program.split("# place")[1]!.split("# start")[1]).not.toMatch(/out|payload/);
 });
+
+it("the payload of the start is set before the arm moves there", () => {
+  const [head] = movejProgram(SHOWN, 1, null, null).split("movej([");
+  expect(head).toContain("set_target_payload(0,");
+});

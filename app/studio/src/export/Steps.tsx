@@ -24,15 +24,21 @@ export function Steps({
   const start = shown.solution.trajectory.q[0]!.map((value) =>
     fixed((value * 180) / Math.PI, 1),
   ).join(", ");
-  const checks = format === "urscript" ? " The program stops if the payload is not taken." : "";
+  const [first = 0] = masses;
+  const most = Math.max(...masses);
+  const mass = (part: number) => figure(part + ((tool?.mass.value as number | undefined) ?? 0));
+  const held = tool ? ` (${first ? "gripper and part" : "gripper"})` : "";
   return (
     <>
       <h3>Before it runs on your robot</h3>
       <ol class="steps">
         <li>
-          Set payload {figure(Math.max(...masses) + ((tool?.mass.value as number) ?? 0))} kg
-          {tool && " (gripper and part)"}, its centre and your safety limits on the controller.
-          {checks}
+          Set the payload of the start, {mass(first)} kg{held}, its centre and your safety limits on
+          the controller.
+          {masses.some((each) => each !== first) &&
+            ` On the way it is up to ${mass(most)} kg: ${
+              program ? "the program changes it at the stops" : "change it at the stops"
+            }.`}
         </li>
         <li>Jog to the start joints and compare the pose: {start}°.</li>
         <li>

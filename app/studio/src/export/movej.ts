@@ -62,12 +62,13 @@ export function movejProgram(
         ? []
         : [`  set_standard_digital_out(${output}, ${mass > base ? "True" : "False"})`];
     const loaded = mass === before && k ? [] : [payload(load, tool)];
+    const move = [`  movej(${joints(q)}, a=${a}, v=${v})`];
     return [
       `  # ${name}`,
-      `  movej(${joints(q)}, a=${a}, v=${v})`,
+      ...(k ? move : [...loaded, ...move]),
       ...grip,
       ...(dwell ? [`  sleep(${number(dwell)})`] : []),
-      ...loaded,
+      ...(k ? loaded : []),
     ];
   });
   return [
