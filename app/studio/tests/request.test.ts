@@ -22,6 +22,7 @@ import {
   withNumber,
 } from "../src/store/request";
 import type { ApiRequest, Pose, Robot } from "../src/store/types";
+import { withTime } from "../src/task/TimeField";
 import { MOVE } from "./cells";
 
 const round = withStop(
@@ -160,4 +161,12 @@ it("another robot takes what fits it", () => {
     start: { q: [0.5, -2] },
     goal: MOVE.goal,
   });
+});
+
+it("another kind of time begins with the seconds of before", () => {
+  expect(withTime(MOVE, "exact", null, 1.234).duration).toBe(1.24);
+  expect(withTime(MOVE, "most", 8).duration).toEqual({ max: 2 });
+  expect(withTime(MOVE, "cycle", 8, 1.2).dwell).toEqual({ time: 8 });
+  expect(withTime({ ...round, time: 5 }, "most", 8, 4).time).toEqual({ max: 5 });
+  expect(withTime({ ...MOVE, dwell: { time: 6 } }, "free", null)).toEqual(MOVE);
 });

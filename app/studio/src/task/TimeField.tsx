@@ -18,18 +18,38 @@ const TEXTS: Record<Choice, string> = {
   other: "as in JSON",
 };
 
-function choiceOf(asked: ApiRequest, field: string): Choice {
+const fieldOf = (asked: ApiRequest) => (asked.stops === undefined ? "/duration" : "/time");
+
+function choiceOf(asked: ApiRequest): Choice {
   if (isObject(asked.dwell)) return "cycle";
-  const given = at(asked, field);
+  const given = at(asked, fieldOf(asked));
   if (typeof given === "number") return "exact";
   if (!isObject(given)) return "free";
   return typeof given.max === "number" && (given.min ?? null) === null ? "most" : "other";
 }
 
-/** The request with another kind of time; the seconds are those of before, where there are any. */
-export function withTime(asked: ApiRequest, choice: Choice, seconds: number): ApiRequest {
-  const round = asked.stops !== undefined;
-  const field = round ? "/time" : "/duration";
+/** Where the seconds of a choice are in the request; null for one without. */
+function secondsAt(asked: ApiRequest): string | null {
+  const field = fieldOf(asked);
+  return { cycle: "/dwell/time", most: `${field}/max`, exact: field, free: null, other: null }[
+    choiceOf(asked)
+  ];
+}
+
+/**
+ * The request with another kind of time. The seconds are those of before; without them those of a
+ * `cycle` that was given, or of the last answer.
+ */
+export function withTime(
+  asked: ApiRequest,
+  choice: Choice,
+  cycle: number | null,
+  last = 2,
+): ApiRequest {
+  const field = fieldOf(asked);
+  const pointer = secondsAt(asked);
+  const given = pointer === null ? last : Number(at(asked, pointer));
+  const seconds = choice === "cycle" && cycle ? cycle : Math.ceil(given * 100) / 100;
   const free = put(put(asked, field, undefined), "/dwell", undefined);
   if (choice === "cycle")
     return put(free, "/dwell", { ...(isObject(asked.dwell) ? asked.dwell : {}), time: seconds });
@@ -40,28 +60,20 @@ export function withTime(asked: ApiRequest, choice: Choice, seconds: number): Ap
 /** How long the motion may take, and how often it comes. */
 export function TimeField() {
   const asked = request.value;
-  const round = kind.value === "round";
-  const field = round ? "/time" : "/duration";
-  const choice = choiceOf(asked, field);
-  const seconds = { cycle: "/dwell/time", most: `${field}/max`, exact: field, free: "", other: "" }[
-    choice
-  ];
+  const field = fieldOf(asked);
+  const choice = choiceOf(asked);
+  const seconds = secondsAt(asked);
   const options: Choice[] = [
-    ...(["free", ...(round ? [] : ["cycle"]), "most", "exact"] as Choice[]),
+    ...(["free", ...(kind.value === "round" ? [] : ["cycle"]), "most", "exact"] as Choice[]),
     ...(choice === "other" ? (["other"] as Choice[]) : []),
   ];
-  const usual = () => {
-    const now =
-      (at(asked, seconds) as number | undefined) ?? answered.value?.solution.duration ?? 2;
-    return Math.ceil(now * 100) / 100;
-  };
   const choose = (next: Choice) => {
     if (next === "other" || next === choice) return;
-    const cycle = economics.value.cycle;
-    edit(withTime(asked, next, next === "cycle" && cycle ? cycle : usual()), typed.value);
+    const last = answered.value?.solution.duration;
+    edit(withTime(asked, next, economics.value.cycle, last), typed.value);
   };
   return (
-    <Section title="Time" action={<Every />}>
+    <Section title="Time" action={choice === "cycle" ? null : <Every />}>
       <Segment
         label="Time"
         value={choice}
