@@ -38,8 +38,7 @@ class AnsweredRequest(Request):
 
     period: LongTime | None = described(
         "Time from one start to the next. What is left of it after the motion or the cycle is "
-        "waited, unless the request has a `dwell` or a `time` of its own. Null: one directly after "
-        "the other.",
+        "waited, unless the request has a `dwell` of its own. Null: one directly after the other.",
         "s",
         6.0,
         default=None,

@@ -131,7 +131,7 @@ def advised(
         Energies and changes; without changes unless the electrical energy is minimised.
     """
     total, duration = float(answer["energy"]["electrical"]["total"]), float(answer["duration"])
-    waits = 0.0 if period is None or _has_own_time(task) else max(period - duration, 0.0)
+    waits = 0.0 if period is None or _has_own_wait(task) else max(period - duration, 0.0)
     waiting = waits * _holding_power(task, (moves or [answer])[-1]) if waits else 0.0
     work, found = _Work(end), list[AdvisedChange]()
     now = base = total + waiting
@@ -150,9 +150,9 @@ def advised(
     return Advised(now, waiting, home, sorted(worth, key=lambda each: -each.saving))
 
 
-def _has_own_time(task: Task) -> bool:
+def _has_own_wait(task: Task) -> bool:
     """Whether the request says itself until when the arm waits."""
-    return (task.dwell if isinstance(task, OptimizeRequest) else task.time) is not None
+    return isinstance(task, OptimizeRequest) and task.dwell is not None
 
 
 def _holding_power(task: Task, move: Json) -> float:

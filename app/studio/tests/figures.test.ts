@@ -1,10 +1,11 @@
 import { busyAfter } from "../src/logs/model";
 import { expect, it } from "vitest";
 import { costsOf, DEFAULT_ECONOMICS } from "../src/store/economics";
+import { periodOf } from "../src/store/facts";
 import { csvOfJob, refusal, type Job, type JobRow } from "../src/jobs/model";
 import { moveName, parseMoves, requestsOf } from "../src/store/moves";
 import { Problem } from "../src/store/client";
-import { trouble } from "../src/store/state";
+import { trouble, type Answered } from "../src/store/state";
 import { tell } from "../src/store/trouble";
 import type { ApiRequest, ProblemDetails } from "../src/store/types";
 import { asShown, atMost, figure, parseNumber, shown, typedValue } from "../src/store/units";
@@ -52,11 +53,18 @@ it("costs are those of whole cycles in a shift", () => {
     { name: "The move", joules: 74.4 },
     { name: "Waiting", joules: 208.9 },
   ];
-  const costs = costsOf(parts, 0.871, { ...DEFAULT_ECONOMICS, cycle: 6 });
+  const costs = costsOf(parts, 6, DEFAULT_ECONOMICS);
   expect(costs.cyclesPerShift).toBe(4800);
   expect(costs.total.shift).toBeCloseTo((283.3 * 4800) / 3.6e6);
   expect(costs.total.year).toBeCloseTo(460 * costs.total.shift);
   expect(costs.money.year).toBeCloseTo(0.2 * costs.total.year);
+});
+
+it("one motion begins as often as it comes, and a request with a wait says it itself", () => {
+  const shown = (asked: ApiRequest) => ({ asked, solution: { duration: 2 } }) as Answered;
+  expect([null, 1, 6].map((cycle) => periodOf(shown({}), cycle))).toEqual([2, 2, 6]);
+  expect(periodOf(shown({ time: { max: 4 } }), 6)).toBe(6);
+  expect(periodOf(shown({ dwell: { time: 3 } }), 6)).toBe(3);
 });
 
 it("the control box counts once a reading is given", () => {
@@ -71,12 +79,12 @@ const HEAD = "from;to;kg;x mm;y;z;rx rad;ry;rz;x;y;z;rx;ry;rz";
 
 it("a table of moves becomes requests of the cell", () => {
   const read = parseMoves(
-    `${HEAD}\nbin;shelf;1,5;-420;280;100;0;3.142;0;-350;-520;450;1.571;0;0`.replace("1,5", "1.5"),
+    `${HEAD}\nbin;shelf;1,5;-420;280;100;0;3,142;0;-350;-520;450;1,571;0;0`,
     6,
   );
   if ("why" in read) throw new Error(read.why);
-  expect(read.readings).toHaveLength(1);
-  const [request] = requestsOf(read.moves, read.readings[0]!, { ...MOVE, duration: 3 }, 6);
+  expect(read.choices).toHaveLength(1);
+  const [request] = requestsOf(read.moves, read.choices[0]!, { ...MOVE, duration: 3 });
   expect(request).toEqual({
     robot: "ur5e",
     scene: MOVE.scene,
@@ -115,8 +123,8 @@ it("targets in rows are moves from each to the next", () => {
   const read = parseMoves("a;0;-90;90;-90;-90;0\nb;30;-90;90;-90;-90;0\nc;60;-90;90;-90;-90;0", 6);
   if ("why" in read) throw new Error(read.why);
   expect(read.moves.map(({ from, to }) => `${from}-${to}`)).toEqual(["a-b", "b-c"]);
-  const joints = read.readings.find(({ kind }) => kind === "joints")!;
-  expect(requestsOf(read.moves, joints, {}, 6)[1]!.goal).toEqual({
+  const joints = read.choices.find(({ rows }) => rows[0]!.kind === "joints")!;
+  expect(requestsOf(read.moves, joints, {})[1]!.goal).toEqual({
     q: [60, -90, 90, -90, -90, 0].map((x) => (x * Math.PI) / 180),
   });
 });

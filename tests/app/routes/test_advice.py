@@ -92,6 +92,16 @@ def test_a_cycle_is_advised_on_its_way_home_and_its_stops(client: TestClient) ->
     assert savings == sorted(savings, reverse=True) and min(savings) > 0
 
 
+def test_the_rest_of_the_period_is_waited_after_a_cycle_with_a_time(client: TestClient) -> None:
+    one = {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], **PATIENT}
+    asked = one | {"time": {"max": 5.0}}
+    kept = client.post("/cycle", json=asked).json()
+    body = {"cycle": asked, "answer": kept["id"], "changes": []}
+    short, long = (advised(client, **body, period=period)["waiting"] for period in (6.0, 8.0))
+    rest = 6.0 - kept["duration"]
+    assert 0 < short == pytest.approx(rest * (long - short) / 2.0)
+
+
 @pytest.mark.long
 def test_the_way_home_is_needed_where_something_is_carried_there(client: TestClient) -> None:
     stops = [CYCLE["stops"][0], CYCLE["stops"][1] | {"payload": PART}]
@@ -114,7 +124,7 @@ def test_a_lighter_tool_has_half_of_the_mass(client: TestClient) -> None:
 
 
 @pytest.mark.long
-def test_a_task_with_its_own_time_or_another_objective_gets_no_wait(client: TestClient) -> None:
+def test_a_task_with_its_own_wait_or_another_objective_gets_no_wait(client: TestClient) -> None:
     own = advised(client, optimize=move(dwell={"time": 4.0}), period=9.0)
     assert own["waiting"] == 0 and set(by_name(own)) <= {"brakes"}
     work = advised(client, optimize=move(objective="mechanical", duration=2.0), period=6.0)

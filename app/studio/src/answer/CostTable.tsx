@@ -4,6 +4,7 @@ import { PlainNumber } from "../ui/PlainNumber";
 import { Section } from "../ui/Section";
 import { costsOf, DEFAULT_ECONOMICS, type Economics, type Sourced } from "../store/economics";
 import { answered, economics, stale, type Answered } from "../store/state";
+import { nounOf, periodOf } from "../store/facts";
 import { figure, fixed } from "../store/units";
 import { adviceFailed, advised, waits } from "./advice";
 
@@ -30,11 +31,7 @@ export function CostTable() {
   const [open, setOpen] = useState(false);
   if (!shown) return null;
   const given = economics.value;
-  const whole =
-    shown.asked?.dwell && typeof (shown.asked.dwell as { time?: number }).time === "number"
-      ? (shown.asked.dwell as { time: number }).time
-      : shown.solution.duration;
-  const costs = costsOf(partsOf(shown), whole, given);
+  const costs = costsOf(partsOf(shown), periodOf(shown, given.cycle), given);
   const unpriced = waits(shown, given.cycle) && !advised.value;
   const kwh = (value: number) => `${figure(value)} kWh`;
   return (
@@ -100,8 +97,11 @@ export function CostTable() {
           {fixed(given.carbon.value, 2)} kg CO₂e a kWh ({short(given.carbon)})
         </span>
         . {given.box ? "" : "The control box itself is not counted: enter a wattmeter’s reading. "}
-        {given.cycle === null && !shown.cycle
+        {given.cycle === null && !shown.cycle && !shown.asked?.dwell
           ? "Back to back: say how often the move comes to price the wait."
+          : ""}
+        {given.cycle !== null && given.cycle < shown.solution.duration
+          ? `This ${nounOf(shown)} takes longer than ${figure(given.cycle)} s. `
           : ""}
         {unpriced
           ? adviceFailed.value

@@ -49,10 +49,7 @@ export const wordsOf = ({ name, energy, share, duration }: Change) =>
 
 /** Whether the motion ends before the next one begins, so that it waits. */
 export const waits = ({ asked, solution }: Answered, cycle: number | null): cycle is number =>
-  cycle !== null &&
-  cycle > solution.duration &&
-  (asked?.dwell ?? null) === null &&
-  (asked?.time ?? null) === null;
+  cycle !== null && cycle > solution.duration && (asked?.dwell ?? null) === null;
 
 /** Follows the answer and the cycle time, from now on. */
 export function followAdvice(): void {

@@ -46,16 +46,12 @@ export interface Costs {
   carbon: { shift: number; year: number };
 }
 
-/**
- * Costs of a motion of `energy` [J] that takes `duration` [s], with `waiting` [J] until the next
- * one begins.
- */
+/** Costs of a motion of several parts, of which one begins every `cycle` seconds. */
 export function costsOf(
   parts: { name: string; joules: number }[],
-  duration: number,
+  cycle: number,
   given: Economics,
 ): Costs {
-  const cycle = Math.max(given.cycle ?? duration, duration);
   const cyclesPerShift = Math.floor((given.shift * 3600) / cycle + 1e-9);
   const box = given.box ? [{ name: "Control box", joules: given.box.value * cycle }] : [];
   const rows = [...parts, ...box].map((part) => {

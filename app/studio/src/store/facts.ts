@@ -1,4 +1,5 @@
 // Figures of the answer, in words.
+import { at } from "./pointer";
 import type { Answered } from "./state";
 import { figure, words } from "./units";
 
@@ -25,6 +26,15 @@ export const baselineName = (name: string) => BASELINES[name] ?? capital(words(n
 export const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
 
 export const nounOf = (shown: Answered) => (shown.cycle ? "round" : "move");
+
+/**
+ * Time from the start of a motion to the start of the next [s]: `cycle`, if one comes every so many
+ * seconds. A request with a wait has its own.
+ */
+export function periodOf({ asked, solution }: Answered, cycle: number | null): number {
+  const own = at(asked, "/dwell/time");
+  return Math.max(typeof own === "number" ? own : (cycle ?? 0), solution.duration);
+}
 
 /** Energy of the objective that was minimised [J]. */
 export const energyOf = ({ solution }: Answered) => solution.energy[solution.objective].total;

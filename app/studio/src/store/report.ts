@@ -1,6 +1,7 @@
 // Reports: pages for those who decide.
 import { send } from "./client";
 import { costsOf, DEFAULT_ECONOMICS, type Economics } from "./economics";
+import { periodOf } from "./facts";
 import { mapShown } from "./placement";
 import { endpointOf } from "./request";
 import { save } from "./share";
@@ -35,7 +36,7 @@ export async function reportAnswer(format: ReportFormat): Promise<void> {
     [endpointOf(shown.asked)]: shown.asked,
     answer: shown.solution.id,
     period: given.cycle,
-    costs: costsFor(given, costsOf([], shown.solution.duration, given).cyclesPerShift),
+    costs: costsFor(given, costsOf([], periodOf(shown, given.cycle), given).cyclesPerShift),
   };
   await report(body, name, format);
 }
