@@ -55,8 +55,8 @@ class CycleTooShort(JoulepathError):
     """Part of this duration in which the arm dwells."""
 
     def __str__(self) -> str:
+        dwells = f", of which it dwells {self.dwells:.4g} s" if self.dwells else ""
         return (
-            f"The fastest cycle found takes {rounded_up(self.shortest)} s, of which it dwells "
-            f"{self.dwells:.4g} s: "
+            f"The fastest cycle found takes {rounded_up(self.shortest)} s{dwells}: "
             "allow at least as much."
         )

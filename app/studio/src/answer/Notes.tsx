@@ -53,7 +53,7 @@ function adviceNotes(): JSX.Element[] {
   if (without || (now.home ?? 0) > LEAST * now.energy)
     notes.unshift(
       <Advice key="home" change={without}>
-        The start and back take {figure(now.home)} of{" "}
+        The moves from the start and back to it take {figure(now.home)} of{" "}
         {figure(shown.solution.energy.electrical.total)} J.
       </Advice>,
     );

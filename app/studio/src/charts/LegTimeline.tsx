@@ -4,7 +4,7 @@ import { time, type CycleShown } from "../store/state";
 import { figure } from "../store/units";
 
 /** Legs as wide as their time and as high as their mean power; the figures are joules. */
-export function LegTimeline({ cycle: { legs } }: { cycle: CycleShown }) {
+export function LegTimeline({ cycle: { legs, loads } }: { cycle: CycleShown }) {
   const most = Math.max(
     ...legs.map(({ electrical, duration }) => electrical / (duration || Infinity)),
   );
@@ -16,7 +16,7 @@ export function LegTimeline({ cycle: { legs } }: { cycle: CycleShown }) {
         {legs.map((leg, k) => {
           const text = `${legName(leg)}: ${figure(leg.duration)} s, ${figure(leg.electrical)} J, ${figure(leg.payload_mass)} kg`;
           const height = (100 * leg.electrical) / (leg.duration || 1) / most;
-          const kind = leg.answer ? (leg.payload_mass ? "loaded" : "unloaded") : "rest";
+          const kind = leg.answer ? (loads[k]?.payload ? "loaded" : "unloaded") : "rest";
           return (
             <button
               type="button"
