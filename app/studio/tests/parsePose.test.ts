@@ -61,6 +61,18 @@ describe("numbers of a pendant", () => {
   });
 });
 
+it("angles of other makers' pendants turn in their own order", () => {
+  const [kuka, ...others] = readings("{X 700, Y 0, Z 500, A 90, B 0, C 180}");
+  expect(others).toEqual([]);
+  // a half turn about x, then a quarter about z
+  const [wpr] = readings("X 700 Y 0 Z 500 W 180 P 0 R 90");
+  kuka!.values.forEach((value, k) => expect(value).toBeCloseTo(wpr!.values[k]!));
+  expect(Math.hypot(...kuka!.values.slice(3))).toBeCloseTo(Math.PI);
+  expect(kuka!.values[3]).toBeCloseTo(kuka!.values[4]!);
+  const [joints] = readings("{A1 0, A2 -1, A3 2, A4 0, A5 1, A6 0}");
+  expect(joints!.values[2]).toBeCloseTo((2 * Math.PI) / 180);
+});
+
 describe("joint positions", () => {
   it("beyond a turn are degrees", () => {
     const [only] = readings("[0, -90, 90, -90, -90, 0]", "joints");

@@ -4,6 +4,8 @@ import { legAt, legName } from "../store/cycle";
 import { answered, stale, time } from "../store/state";
 import { atMost, figure } from "../store/units";
 
+const MOST = 11; // ratio to the bound from which on a gap says nothing
+
 /** The legs of a round, each with its own gap. */
 export function Legs() {
   const cycle = answered.value?.cycle;
@@ -37,7 +39,7 @@ export function Legs() {
               <td>{figure(leg.duration)}</td>
               <td>{figure(leg.electrical)}</td>
               <td>
-                {leg.answer && leg.lower_bound > 0
+                {leg.answer && leg.electrical < MOST * leg.lower_bound
                   ? atMost(leg.electrical / leg.lower_bound - 1)
                   : "–"}
               </td>

@@ -35,7 +35,7 @@ const NEAREST = 0.02;
 const FARTHEST = 4;
 const NUMBER = /[+\-−]?(?:\d+(?:[.]\d*)?|[.]\d+)(?:e[+-]?\d+)?/gi;
 const LABEL =
-  /\b(?:r[xyz]|[xyz]|rpy|roll|pitch|yaw|j\d|q\d|joint ?\d|base|shoulder|elbow|wrist ?\d)\b\s*[:=]?/gi;
+  /\b(?:r[xyz]|[xyz]|rpy|roll|pitch|yaw|[ajq]\d|joint ?\d|base|shoulder|elbow|wrist ?\d)\b\s*[:=]?/gi;
 
 const LENGTHS = [
   { inMetre: 1000, name: "mm" },
@@ -101,13 +101,17 @@ const isLikely = ({ echo }: Choice, _: number, all: Choice[]) =>
 
 const RADIANS = "RX RY RZ in rad";
 const RPY = "roll, pitch, yaw in degrees";
+const ABC = "A, B, C in degrees";
+// KUKA turns about z, y and x in this order; W, P, R of FANUC are roll, pitch and yaw
+export const ABC_SAID = /\ba\b[^a-z]+\bb\b[^a-z]+\bc\b/i;
+export const RPY_SAID = /\brpy\b|\broll\b|\bw\b.+\bp\b.+\br\b/i;
 
 function readingsOf(text: string, joints: number, prefer?: Reading["kind"]): Parsed {
   const numbers = numbersOf(text);
   if (!numbers.length)
     return { why: "No number was found: paste p[…], six numbers or joint positions." };
-  const asPose = /\bp\s*\[/i.test(text) || /\br[xyz]\b|\bx\b|\brpy\b|\broll\b/i.test(text);
-  const asJoints = /\b(?:j|q|joint ?)1\b|\bbase\b|\bshoulder\b/i.test(text) || MOVE.test(text);
+  const asPose = /\bp\s*\[/i.test(text) || /\br[xyz]\b|\bx\b/i.test(text) || RPY_SAID.test(text);
+  const asJoints = /\b(?:[ajq]|joint ?)1\b|\bbase\b|\bshoulder\b/i.test(text) || MOVE.test(text);
   const poses = asJoints || numbers.length !== 6 ? [] : posesOf(text, numbers);
   const angles = asPose || numbers.length !== joints ? [] : jointsOf(text, numbers, joints);
   const readings = choose(poses, angles, prefer);
@@ -174,7 +178,8 @@ function turnsOf(
   const vector = { rotvec: turn.map((value) => value * DEGREE), name: "RX RY RZ in degrees" };
   const rpy = { rotvec: ofRpy(turn), name: RPY };
   if (script) return [radians];
-  const degrees = /\brpy\b|\broll\b/i.test(text) ? [rpy] : [vector, rpy];
+  if (ABC_SAID.test(text)) return [{ rotvec: ofRpy(turn.toReversed()), name: ABC }];
+  const degrees = RPY_SAID.test(text) ? [rpy] : [vector, rpy];
   if (/°|\bdeg/.test(text)) return degrees;
   if (/\brad\b/.test(text)) return [radians];
   const small = turn.every((value) => Math.abs(value) <= TURN);
@@ -196,7 +201,7 @@ function jointsOf(text: string, numbers: number[], joints: number): Reading[] {
     values: values.map((value) => value * DEGREE),
     echo: "joints in degrees",
   };
-  if (/°|\bdeg/.test(text)) return [degrees];
+  if (/°|\bdeg|\ba1\b/i.test(text)) return [degrees];
   if (/\brad\b/.test(text) || MOVE.test(text)) return [radians];
   if (values.some((value) => Math.abs(value) > 400)) return [];
   if (values.some((value) => Math.abs(value) > TURN)) return [degrees];

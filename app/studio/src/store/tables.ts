@@ -1,5 +1,5 @@
 // Tables of numbers, as spreadsheets and programs hold them.
-import { numbersOf, parseAlike, type Choice } from "./parsePose";
+import { ABC_SAID, numbersOf, parseAlike, RPY_SAID, type Choice } from "./parsePose";
 
 const NUMBER = /^[+\-−]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
 
@@ -25,7 +25,8 @@ export function unitsOf(head: string): string {
   const length = /\bmm\b|_mm/.test(text) ? " mm" : /[[(_ ]m[\])\s]/.test(text) ? " m" : "";
   const angle = /\bdeg|_deg|°/.test(text) ? " deg" : /\brad\b|_rad/.test(text) ? " rad" : "";
   const kind = /\bq_?1|\bj_?1|joint/.test(text) ? " q1" : /\brx\b|rx[_ [(]/.test(text) ? " rx" : "";
-  return `${length}${angle}${kind}`;
+  const turn = ABC_SAID.test(text) ? " a b c" : RPY_SAID.test(text) ? " rpy" : "";
+  return `${length}${angle}${kind}${turn}`;
 }
 
 export interface TableRow {

@@ -2,6 +2,7 @@ import { Button } from "../ui/Button";
 import { Errors } from "../ui/Errors";
 import { Section } from "../ui/Section";
 import { tool } from "../picture/drag";
+import { robotNow } from "../picture/pictured";
 import { withStop, withVia } from "../store/edits";
 import { put } from "../store/pointer";
 import { rowsOf } from "../store/request";
@@ -9,6 +10,11 @@ import { edit, kind, request, selected, typed } from "../store/state";
 import { PasteBox } from "./PasteBox";
 import { PoseRow } from "./PoseRow";
 import { presentTarget, takePose } from "./take";
+
+const unitsNote = () =>
+  robotNow.value?.title.startsWith("Universal Robots")
+    ? "mm and rad, as on the pendant"
+    : "mm; RX RY RZ: rotation vector in rad";
 
 /** Where the arm begins, passes, stops and ends. */
 export function TargetTable() {
@@ -23,7 +29,7 @@ export function TargetTable() {
   return (
     <Section
       title={round ? "Stops" : "Targets"}
-      note={round ? `${rows.length - 1}` : "mm and rad, as on the pendant"}
+      note={round ? `${rows.length - 1}` : unitsNote()}
       id="targets"
     >
       {round && <Order />}

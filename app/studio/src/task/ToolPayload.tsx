@@ -89,7 +89,7 @@ function TcpCells({ tcp }: { tcp: Pose }) {
   const six = sixOf({ ...tcp, position: listOf<number>(tcp.position) });
   return (
     <>
-      <p class="hint">TCP at the flange, as on the pendant</p>
+      <p class="hint">TCP at the flange</p>
       <PoseCells
         name="TCP"
         pointer="/tcp"
