@@ -1,7 +1,7 @@
 import { busyAfter } from "../src/logs/model";
 import { expect, it } from "vitest";
 import { costsOf, DEFAULT_ECONOMICS } from "../src/store/economics";
-import { periodOf } from "../src/store/facts";
+import { baselineName, periodOf, plain } from "../src/store/facts";
 import { csvOfJob, refusal, type Job, type JobRow } from "../src/jobs/model";
 import { moveName, parseMoves, requestsOf } from "../src/store/moves";
 import { Problem } from "../src/store/client";
@@ -65,6 +65,14 @@ it("one motion begins as often as it comes, and a request with a wait says it it
   expect([null, 1, 6].map((cycle) => periodOf(shown({}), cycle))).toEqual([2, 2, 6]);
   expect(periodOf(shown({ time: { max: 4 } }), 6)).toBe(6);
   expect(periodOf(shown({ dwell: { time: 3 } }), 6)).toBe(3);
+});
+
+it("usual ways and their faults are named in the words of the panel", () => {
+  expect([baselineName("quintic"), baselineName("quintic", true)]).toEqual([
+    "Quintic in joints",
+    "Quintic along the path",
+  ]);
+  expect(plain("`controller_default` is left out.")).toBe("“Controller default” is left out.");
 });
 
 it("the control box counts once a reading is given", () => {

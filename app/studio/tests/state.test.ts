@@ -6,6 +6,7 @@ import {
   canRedo,
   canUndo,
   changes,
+  economics,
   edit,
   redo,
   replaceCell,
@@ -96,4 +97,10 @@ it("differences are named as the page names them", () => {
   const turned = put(MOVE, "/goal/pose", { position: [-0.35, -0.52, 0.45], rotvec: [0, 0, 1] });
   expect(diff(MOVE, turned)[0]?.before).toBe("1.571, 0.000, 0.000");
   expect(names({ ...MOVE })).toEqual([]);
+});
+
+it("prices stay for another cell, and how often a motion came does not", () => {
+  economics.value = { ...economics.value, cycle: 8, shift: 7 };
+  replaceCell({ project: { id: "2", name: "other" }, request: MOVE });
+  expect(economics.value).toMatchObject({ cycle: null, shift: 7 });
 });

@@ -22,11 +22,12 @@ export function Baselines() {
   const kept = baselines.filter((each) => each.within_limits);
   const broken = baselines.filter((each) => !each.within_limits);
   const first = all ? broken : broken.slice(0, FEW);
+  const nameOf = (name: string) => baselineName(name, Boolean(shown.asked?.path));
   const row = (each: Baseline) => (
     <tr key={each.name} class={each.within_limits ? undefined : "broken"}>
       <th scope="row">
         <i class={`swatch ${each.within_limits ? "other" : "hatched"}`} />
-        {baselineName(each.name)}
+        {nameOf(each.name)}
       </th>
       <td>{figure(each.duration)} s</td>
       <td>{figure(each[objective])}</td>
@@ -67,7 +68,7 @@ export function Baselines() {
             .filter(({ reason }) => reason)
             .map(({ name, reason }) => (
               <span class="reason" key={name}>
-                {baselineName(name)}: {reason}.{" "}
+                {nameOf(name)}: {reason}.{" "}
               </span>
             ))}
           {broken.length > FEW && (

@@ -49,7 +49,7 @@ export function CostTable() {
           <tr>
             <td />
             <th scope="col">
-              <b>{shown.cycle ? "round" : "cycle"}</b> {figure(costs.cycle)} s
+              <b>{shown.cycle ? "round" : "cycle"}</b> {`${figure(costs.cycle)}\u00a0s`}
             </th>
             <th scope="col">
               <b>shift</b> {fixed(costs.cyclesPerShift, 0)}×

@@ -21,7 +21,11 @@ export const BASELINES: Record<string, string> = {
   without_storage: "Without the storage",
 };
 
-export const baselineName = (name: string) => BASELINES[name] ?? capital(words(name));
+/** The name of a usual way; along a path, none moves straight in the joints. */
+export const baselineName = (name: string, along = false) =>
+  along && name === "quintic"
+    ? "Quintic along the path"
+    : (BASELINES[name] ?? capital(words(name)));
 
 export const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
 
@@ -66,10 +70,11 @@ export const postureWords = (label: string) =>
 
 // fields that the service names in a sentence, in the words of the panel
 const NAMED: Record<string, string> = {
+  "`controller_default`": "“Controller default”",
   "`payload.shape`": "“Form” of the payload",
   "`tool.capsules`": "the capsules of the tool",
 };
 
 /** A sentence of the service without its marks of code. */
 export const plain = (text: string) =>
-  text.replace(/`[a-z.]+`/g, (field) => NAMED[field] ?? field).replaceAll("`", "");
+  text.replace(/`[a-z._]+`/g, (field) => NAMED[field] ?? field).replaceAll("`", "");

@@ -214,7 +214,8 @@ export function replaceCell(cell: {
     project.value = cell.project;
     request.value = cell.request;
     typed.value = cell.typed ?? {};
-    if (cell.economics) economics.value = cell.economics;
+    // prices are those of the place, but how often a motion comes is of its cell
+    economics.value = cell.economics ?? { ...economics.value, cycle: null };
     answered.value = null;
     racers.value = [];
     ghosts.value = [];

@@ -3,6 +3,7 @@ import { NumberCell } from "../ui/NumberCell";
 import { Section } from "../ui/Section";
 import { Segment } from "../ui/Segment";
 import { at, put } from "../store/pointer";
+import { isObject } from "../store/request";
 import { edit, request, write } from "../store/state";
 
 const SHAPES = [
@@ -16,7 +17,6 @@ export function PathFields() {
   const shape = String(
     at(request.value, "/path/shape") ?? "lines",
   ) as (typeof SHAPES)[number]["value"];
-  const speed = at(request.value, "/path/speed");
   return (
     <Section title="Along the path">
       <Segment
@@ -26,28 +26,7 @@ export function PathFields() {
         onChange={(next) => edit(put(request.value, "/path/shape", next))}
       />
       <div class="fields">
-        <label class="field">
-          <span>TCP speed</span>
-          <input
-            type="checkbox"
-            aria-label="Limit the speed"
-            checked={speed !== undefined && speed !== null}
-            onChange={(event) =>
-              write("/path/speed", event.currentTarget.checked ? 0.1 : undefined)
-            }
-          />
-          {typeof speed === "number" ? (
-            <NumberCell
-              label="TCP speed"
-              pointer="/path/speed"
-              value={speed}
-              unit="mmps"
-              withUnit
-            />
-          ) : (
-            <small>as fast as the limits allow</small>
-          )}
-        </label>
+        <Speed />
         {shape === "lines" && (
           <div class="field">
             <span>Corners rounded by</span>
@@ -63,5 +42,53 @@ export function PathFields() {
       </div>
       <Errors under="/path" except={["/path/via"]} />
     </Section>
+  );
+}
+
+/** The largest speed of the TCP, and whether it is held, as for a bead of glue. */
+function Speed() {
+  const given = at(request.value, "/path/speed") ?? undefined;
+  const most = isObject(given) ? given.max : given;
+  const held = isObject(given) && given.min === most;
+  const set = (value: number | undefined, fixed: boolean, text?: string) =>
+    fixed
+      ? write("/path/speed", { ...(isObject(given) ? given : {}), min: value, max: value })
+      : write("/path/speed", value, text);
+  if (given !== undefined && (typeof most !== "number" || (isObject(given) && !held)))
+    return <p class="hint">TCP speed: as in JSON</p>;
+  return (
+    <>
+      <label class="field">
+        <span>TCP speed at most</span>
+        <input
+          type="checkbox"
+          aria-label="Limit the speed"
+          checked={given !== undefined}
+          onChange={(event) => set(event.currentTarget.checked ? 0.1 : undefined, false)}
+        />
+        {given === undefined ? (
+          <small>as fast as the limits allow</small>
+        ) : (
+          <NumberCell
+            label="TCP speed"
+            pointer={held ? "/path/speed/max" : "/path/speed"}
+            value={most}
+            unit="mmps"
+            onValue={(value, text) => set(value, held, text)}
+            withUnit
+          />
+        )}
+      </label>
+      {typeof most === "number" && (
+        <label class="field">
+          <input
+            type="checkbox"
+            checked={held}
+            onChange={(event) => set(most, event.currentTarget.checked)}
+          />
+          <span>held all along, as for glue</span>
+        </label>
+      )}
+    </>
   );
 }
