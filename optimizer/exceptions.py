@@ -326,6 +326,14 @@ class NoTrajectory(_SearchError):
         "No candidate gave a motion within the limits: relax a limit or allow a longer duration."
     )
 
+    def __str__(self) -> str:
+        failed = [each for each in self.candidates if each.status is CandidateStatus.FAILED]
+        reasons = {each.reason for each in failed}
+        if len(reasons) != 1 or not (reason := reasons.pop()):
+            return self.detail
+        remedy = "" if ": give" in reason else " Relax a limit or allow a longer duration."
+        return f"Every candidate failed: {reason}.{remedy}"
+
 
 class DeadlineExceeded(_SearchError):
     """The deadline passed before any motion was certified. The wait for a free worker counts."""

@@ -199,6 +199,7 @@ def test_a_speed_beyond_the_joints_says_what_to_do() -> None:
     with pytest.raises(NoTrajectory) as refusal:
         optimize(replace(CORNER, tool_path=replace(path_of(CORNER), fixed_speed=0.6)))
     assert "lower speed" in refusal.value.candidates[0].reason
+    assert "lower speed" in str(refusal.value), "the only reason is part of the message"
 
 
 @pytest.mark.parametrize(
