@@ -20,3 +20,11 @@ it("the back button leads from the library to the cell", () => {
   expect(page.value).toBe("cell");
   expect(entries).toHaveLength(2);
 });
+
+it("a page that is loaded again shows what it showed", () => {
+  const ignore = () => undefined;
+  vi.stubGlobal("history", { state: { page: "logs" }, replaceState: ignore, pushState: ignore });
+  vi.stubGlobal("window", { addEventListener: () => undefined });
+  followHistory();
+  expect(page.value).toBe("logs");
+});

@@ -104,3 +104,11 @@ it("prices stay for another cell, and how often a motion came does not", () => {
   replaceCell({ project: { id: "2", name: "other" }, request: MOVE });
   expect(economics.value).toMatchObject({ cycle: null, shift: 7 });
 });
+
+it("changed times and speeds are told with their units", () => {
+  const speed = (given: unknown) => ({ ...MOVE, path: { speed: given } });
+  const [held] = diff(speed(0.25), speed({ min: 0.3, max: 0.3 }));
+  expect([held!.before, held!.after]).toEqual(["250 mm/s", "exactly 300 mm/s"]);
+  const [time] = diff({ ...MOVE, duration: 2 }, { ...MOVE, duration: { max: 3 } });
+  expect([time!.before, time!.after]).toEqual(["2.00 s", "at most 3.00 s"]);
+});

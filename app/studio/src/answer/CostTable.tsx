@@ -32,7 +32,7 @@ export function CostTable() {
   if (!shown) return null;
   const given = economics.value;
   const costs = costsOf(partsOf(shown), periodOf(shown, given.cycle), given);
-  const unpriced = waits(shown, given.cycle) && !advised.value;
+  const unpriced = waits(shown, given.cycle) && !advised.value && !stale.value;
   const kwh = (value: number) => `${figure(value)} kWh`;
   return (
     <Section

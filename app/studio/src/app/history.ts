@@ -4,6 +4,8 @@ import { page, type Page } from "../store/state";
 
 /** Follows the pages from now on, in the history of the browser. */
 export function followHistory(): void {
+  // a page that is loaded again shows what it showed
+  page.value = (history.state as { page?: Page } | null)?.page ?? page.value;
   let shown: Page = page.value;
   history.replaceState({ page: shown }, "");
   effect(() => {

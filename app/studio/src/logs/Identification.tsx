@@ -2,6 +2,8 @@ import { useEffect, useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { plain } from "../store/facts";
 import { get } from "../store/client";
+import { withRobot } from "../store/edits";
+import { robotName } from "../store/request";
 import { robotOf } from "../store/service";
 import { edit, page, request, toast } from "../store/state";
 import type { Robot } from "../store/types";
@@ -34,9 +36,11 @@ export function Identification() {
   if (!robot) return <p class="hint">…</p>;
   const told = result.parameters.filter(({ identified }) => identified).length;
   const use = () => {
-    edit({ ...request.value, robot: robot.name, figures: found.figures });
+    const same = robotName(request.value) === robot.name;
+    const cell = same ? request.value : withRobot(request.value, robot);
+    edit({ ...cell, figures: found.figures });
     page.value = "cell";
-    toast.value = "The cell has these figures now: Optimise computes with them.";
+    toast.value = `The cell has ${same ? "" : `a ${robot.title} with `}these figures now: Optimise computes with them.`;
   };
   return (
     <div id="identification">

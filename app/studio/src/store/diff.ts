@@ -109,6 +109,7 @@ export function unitAt(pointer: Pointer): UnitName {
   if (/\/q\/\d$/.test(pointer)) return "deg";
   if (/\/(rotvec|rpy)\/\d$/.test(pointer)) return "rad";
   if (/\/mass$/.test(pointer)) return "kg";
+  if (/speed(\/m(ax|in))?$/.test(pointer)) return "mmps";
   if (/\/(duration|dwell|time|max|min|deadline)$/.test(pointer)) return "s";
   return "one";
 }
@@ -128,5 +129,9 @@ function textOf(pointer: Pointer, value: unknown): string {
       ? `${value.map((each) => shown(each, unit)).join(", ")} ${UNITS[unit].sign}`.trim()
       : `${value.length} entries`;
   }
-  return isObject(value) && typeof value.mass === "number" ? `${value.mass} kg` : "set";
+  if (!isObject(value)) return "set";
+  if (typeof value.mass === "number") return `${value.mass} kg`;
+  if (typeof value.max !== "number") return "set";
+  const most = textOf(`${pointer}/max`, value.max);
+  return value.min === value.max ? `exactly ${most}` : `at most ${most}`;
 }

@@ -1,4 +1,5 @@
 // Opening cells: from an example, a project, a link or a kept answer.
+import { batch } from "@preact/signals";
 import { get } from "./client";
 import { askedFor, newId, projects, type Saved } from "./persist";
 import { optimise, showAnswer } from "./run";
@@ -37,7 +38,13 @@ export async function openCell(cell: Cell, name: string, compute = true): Promis
 /** The project that was saved last; the example, where there is none. */
 export async function openLast(): Promise<void> {
   const [last] = await projects().catch((): Saved[] => []);
-  await (last ? openProject(last) : openFirst());
+  const shown = page.value;
+  // the cell comes, and the page stays
+  await batch(() => {
+    const opening = last ? openProject(last) : openFirst();
+    page.value = shown;
+    return opening;
+  });
 }
 
 /** A saved project, with its answer where the service still has it. */
