@@ -77,12 +77,20 @@ export const jointName = (name: string) => words(name.replace(/_joint$/, ""));
 
 const LONGEST = 5; // what is longer is told in metres [m]
 
+const inDegrees = (text: string) =>
+  text
+    .replaceAll(" rad", "°")
+    .replace(/-?\d+\.?\d*(e[+-]?\d+)?/g, (value) => shown(Number(value), "deg"))
+    .replace(" and ", "° and ");
+
 /** What the service says, in the units and the names of joints of the page. */
 export const asShown = (text: string): string =>
   text
     .replace(/\b[a-z0-9_]+_joint\b/g, jointName)
     .replaceAll("stops/", "stop ")
     .replace("give it in metres, not millimetres, or ", "") // lengths are typed in millimetres
+    .replace(" It looks like degrees: divide it by 57.29578.", "") // joints are typed in degrees
+    .replace(/ is at .* rad: give a value between .* rad/, inDegrees)
     .replace(/(\d+(?:\.\d+)?(?:e-?\d+)?) m\b(?![²³])/g, (whole, metres: string) =>
       Number(metres) < LONGEST ? `${figure(Number(metres) * 1000, 2)} mm` : whole,
     );

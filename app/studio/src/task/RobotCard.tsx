@@ -29,7 +29,7 @@ export function RobotCard() {
             onClick={() => (page.value = "logs")}
             title="From logs of your own arm"
           >
-            use yours
+            {own ? "see your logs" : "use yours"}
           </Button>
         </p>
       </div>

@@ -81,11 +81,15 @@ function Wrong() {
         <b>{now.title}.</b> {now.text}
         {elsewhere.length > 0 && (
           <ul>
-            {elsewhere.map(({ pointer, text }) => (
-              <li key={pointer}>
-                <code>{pointer.slice(1).replaceAll("/", ".")}</code> {text}
-              </li>
-            ))}
+            {elsewhere.map(({ pointer, text }) => {
+              const field = pointer.slice(1).replaceAll("/", ".");
+              return (
+                <li key={pointer}>
+                  {!text.startsWith(field) && <code>{field} </code>}
+                  {text}
+                </li>
+              );
+            })}
           </ul>
         )}
         {now.link && (
