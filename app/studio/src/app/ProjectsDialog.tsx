@@ -2,9 +2,19 @@ import { useEffect, useState } from "preact/hooks";
 import { Dialog } from "../ui/Dialog";
 import { KeptRow } from "../ui/KeptRow";
 import { deleteProject, projects, renameProject, saveNow, type Saved } from "../store/persist";
+import { kindOf, listOf, robotName } from "../store/request";
 import { project } from "../store/state";
+import type { ApiRequest } from "../store/types";
 import { when } from "../store/units";
 import { openProject } from "../store/open";
+
+/** What a cell is, to tell it from others of its name. */
+function cellText(asked: ApiRequest): string {
+  const kind = kindOf(asked);
+  const count = listOf(asked.stops).length;
+  const stops = count === 1 ? "1 stop" : `${count} stops`;
+  return `${robotName(asked)}, ${kind === "round" ? stops : kind}`;
+}
 
 /** The projects of this browser. */
 export function ProjectsDialog({ onClose }: { onClose: () => void }) {
@@ -46,7 +56,7 @@ export function ProjectsDialog({ onClose }: { onClose: () => void }) {
           <KeptRow
             key={each.id}
             name={each.name}
-            facts={`${when(new Date(each.savedAt).toISOString())}${isOpen(each) ? " · open" : ""}`}
+            facts={`${cellText(each.request)} · ${when(new Date(each.savedAt).toISOString())}${isOpen(each) ? " · open" : ""}`}
             current={isOpen(each)}
             onOpen={() => open(each)}
             onRename={(name) => rename(each, name)}
