@@ -1,7 +1,8 @@
 // The back button leads through the pages of the studio, and not out of it.
 import { expect, it, vi } from "vitest";
 import { followHistory } from "../src/app/history";
-import { page } from "../src/store/state";
+import { edit, page, replaceCell } from "../src/store/state";
+import { MOVE } from "./cells";
 
 it("the back button leads from the library to the cell", () => {
   const entries: unknown[] = [null];
@@ -27,4 +28,21 @@ it("a page that is loaded again shows what it showed", () => {
   vi.stubGlobal("window", { addEventListener: () => undefined });
   followHistory();
   expect(page.value).toBe("logs");
+});
+
+it("an edited cell is no longer that of the link in the address", () => {
+  const address = { hash: "#r=abc", pathname: "/studio", search: "" };
+  const replaced: string[] = [];
+  vi.stubGlobal("location", address);
+  vi.stubGlobal("window", { addEventListener: () => undefined });
+  vi.stubGlobal("history", {
+    state: null,
+    pushState: () => undefined,
+    replaceState: (_: unknown, __: string, url?: string) => url && replaced.push(url),
+  });
+  followHistory();
+  replaceCell({ project: { id: "1", name: "of the link" }, request: MOVE });
+  expect(replaced).toEqual([]);
+  edit({ ...MOVE, duration: 2 });
+  expect(replaced.at(-1)).toBe("/studio");
 });

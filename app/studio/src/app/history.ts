@@ -1,6 +1,6 @@
 // The browser's back and forward buttons lead through the pages of the studio.
 import { effect } from "@preact/signals";
-import { page, type Page } from "../store/state";
+import { canUndo, page, request, type Page } from "../store/state";
 
 /** Follows the pages from now on, in the history of the browser. */
 export function followHistory(): void {
@@ -12,6 +12,11 @@ export function followHistory(): void {
     if (page.value === shown) return;
     shown = page.value;
     history.pushState({ page: shown }, "");
+  });
+  // the cell of a link is another one after the first edit: loading the page again must not open it
+  effect(() => {
+    if (request.value && canUndo.peek() && location.hash)
+      history.replaceState(history.state, "", location.pathname + location.search);
   });
   window.addEventListener("popstate", ({ state }: PopStateEvent) => {
     page.value = shown = (state as { page?: Page } | null)?.page ?? "cell";
