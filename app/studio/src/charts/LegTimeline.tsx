@@ -3,6 +3,8 @@ import { legAt, legName } from "../store/cycle";
 import { time, type CycleShown } from "../store/state";
 import { figure } from "../store/units";
 
+const FITS = 22; // height from which on the joules fit into a leg [%]
+
 /** Legs as wide as their time and as high as their mean power; the figures are joules. */
 export function LegTimeline({ cycle: { legs, loads } }: { cycle: CycleShown }) {
   const most = Math.max(
@@ -28,7 +30,7 @@ export function LegTimeline({ cycle: { legs, loads } }: { cycle: CycleShown }) {
               style={{ flexGrow: leg.duration, height: `${Math.max(8, height)}%` }}
               onClick={() => goTo(leg.t0)}
             >
-              <span>{leg.answer ? figure(leg.electrical) : ""}</span>
+              <span>{leg.answer && height > FITS ? figure(leg.electrical) : ""}</span>
             </button>
           );
         })}
