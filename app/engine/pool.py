@@ -33,6 +33,8 @@ class PoolSettings:
     """Delay of the first replacement of a worker [s], doubled after every failure."""
     longest_restart_delay: float = 30.0
     """Longest delay of a replacement [s]."""
+    longest_warm_up: float = 1800.0
+    """Time of a worker for its start [s]; many kernels compile for minutes, a frozen one never."""
     check_period: float = 1.0
     """Time [s] between two checks of the queue's consistency."""
     most_deaths: int = 2
@@ -203,10 +205,11 @@ class Engine:
                 worker = Worker(
                     self._warm, self._settings.log_level, self._threads, self._settings.stop_grace
                 )
-                await worker.start()
+                async with asyncio.timeout(POOL.longest_warm_up):
+                    await worker.start()
             except Exception as error:
                 # also without memory, files or threads for it: there may be some later
-                is_told = isinstance(error, WorkerLost)
+                is_told = isinstance(error, WorkerLost | TimeoutError)
                 logger.error(
                     "worker did not start",
                     exc_info=None if is_told else error,

@@ -15,8 +15,10 @@ class TypoSettings:
     """Longest name compared with known names [characters]."""
     shortest: int = 3
     """Shortest name compared with known names [characters]."""
-    alike: float = 0.6
-    """Least share of common letters of a suggestion, see difflib."""
+    alike: float = 0.65
+    """Least share of common letters of a suggestion, see difflib; `duration` and `friction` have
+    0.63.
+    """
     nearly_same: float = 0.8
     """Least share of common letters of a name taken for another one."""
     compared: int = 4

@@ -153,3 +153,7 @@ def no_warm_up() -> None:
 
 def failing_warm_up() -> None:
     raise RuntimeError("no kernel")
+
+
+def frozen_warm_up() -> None:
+    os.kill(os.getpid(), signal.SIGSTOP)

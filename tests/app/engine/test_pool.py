@@ -12,6 +12,7 @@ from functools import partial
 
 import pytest
 
+from joulepath.app.engine.pool import POOL
 from joulepath.app.engine.task import outcome, result_of
 from joulepath.app.exceptions.base import InternalError, InvalidRequest
 from joulepath.app.exceptions.queue import Busy, ShuttingDown
@@ -32,6 +33,7 @@ from tests.app.engine.simple_tasks import (
     ProcessId,
     TimeLeft,
     failing_warm_up,
+    frozen_warm_up,
 )
 from tests.app.live import alive
 
@@ -159,6 +161,15 @@ async def test_is_not_ready_without_a_warm_worker(
     bench.move_clock(LONG)
     with pytest.raises(DeadlineExceeded):
         await waiting
+
+
+@settings(warm=frozen_warm_up)
+async def test_a_worker_that_freezes_in_its_warm_up_is_given_up(
+    caplog: pytest.LogCaptureFixture, bench: Bench
+) -> None:
+    await asyncio.sleep(0)  # until the end of its start is awaited
+    bench.move_clock(POOL.longest_warm_up)
+    await until(lambda: "worker did not start" in caplog.messages)
 
 
 async def test_what_a_task_finds_comes_before_its_result(bench: Bench) -> None:
