@@ -53,6 +53,23 @@ class BodyTooLarge(ServiceError):
     detail = "The body is larger than the service accepts: send a smaller body."
 
 
+class UploadNotStored(ServiceError):
+    """The folder of temporary files, `TMPDIR` of the service, has no space for the body or cannot
+    be written; the service's log has the reason."""
+
+    status = 503
+    retry_after = 5
+    title = "Upload not stored"
+    remedy = (
+        "Try again after the time [s] in the header `Retry-After`. If the problem remains, the "
+        "operator must enlarge or empty the folder."
+    )
+    detail = (
+        "The service cannot write the body to its folder of temporary files: try again later, or "
+        "ask the operator to make space in TMPDIR."
+    )
+
+
 @dataclass(eq=False)
 class HeadTooLarge(ServiceError):
     """The request's line and headers exceed `JOULEPATH_MAX_HEAD_BYTES`. The connection is

@@ -16,7 +16,7 @@ from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.api.shared.uploads import received
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import KeyReused, UnknownFigures, UnknownLog
-from joulepath.app.exceptions.transport import UnsupportedMediaType
+from joulepath.app.exceptions.transport import UnsupportedMediaType, UploadNotStored
 from joulepath.app.http.json_route import UNDECLARED, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
@@ -74,6 +74,7 @@ def _kind_of(file: IO[bytes]) -> _Kind:
             InvalidTable,
             LogTooLarge,
             UnsupportedMediaType,
+            UploadNotStored,
             KeyReused,
         ),
     },

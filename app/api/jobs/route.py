@@ -28,7 +28,12 @@ from joulepath.app.exceptions.stored import (
     StoreUnavailable,
     UnknownJob,
 )
-from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout, UnsupportedMediaType
+from joulepath.app.exceptions.transport import (
+    BodyTooLarge,
+    RequestTimeout,
+    UnsupportedMediaType,
+    UploadNotStored,
+)
 from joulepath.app.http.event_stream import EVENT_SCHEMA, EVENT_STREAM, EVENT_STREAM_HEADERS
 from joulepath.app.http.json_route import UNDECLARED, JsonRoute, media_type
 from joulepath.app.http.openapi import problem_responses
@@ -71,6 +76,7 @@ _OF_ONE = (UnknownJob, StoreUnavailable)
             BodyTooLarge,
             RequestTimeout,
             UnsupportedMediaType,
+            UploadNotStored,
             Busy,
             ShuttingDown,
             DeadlineExceeded,

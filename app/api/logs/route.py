@@ -22,7 +22,7 @@ from joulepath.app.api.shared.uploads import received
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import StoreUnavailable, TooManyLogs, UnknownLog
-from joulepath.app.exceptions.transport import UnsupportedMediaType
+from joulepath.app.exceptions.transport import UnsupportedMediaType, UploadNotStored
 from joulepath.app.http.json_route import UNDECLARED, JsonRoute, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import LOG_ID
@@ -60,6 +60,7 @@ _SHOWN = tuple(name for name in LogSummary.model_fields if name not in ("tags", 
             LogTooLarge,
             TooManyLogs,
             UnsupportedMediaType,
+            UploadNotStored,
         ),
     },
     openapi_extra={

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import resource
+import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
+from starlette.testclient import TestClient
 
+from joulepath.app.api.shared import uploads
 from joulepath.app.exceptions.queue import Busy, TooManyBytes, TooManyBytesOfClient, TooManyRequests
+from joulepath.app.exceptions.transport import UploadNotStored
 from joulepath.app.http.bytes_in_flight import BytesInFlight, Held
 from tests.app.live import Server, serving, until
 from tests.app.problems import checked
@@ -103,6 +109,30 @@ def test_a_killed_service_leaves_no_files(tmp_path: Path, monkeypatch: pytest.Mo
             for path in tmp_path.rglob("*")
             if path.is_file() and path.name.startswith("joulepath-")
         ]
+
+
+@pytest.mark.parametrize("path", ["/evaluate", "/jobs"])
+def test_a_body_without_space_is_a_problem(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch, path: str
+) -> None:
+    full = partial(Path("/dev/full").open, "r+b", 0)
+    monkeypatch.setattr(uploads, "TemporaryFile", lambda **_: full())
+    problem = client.post(path, json={})
+    monkeypatch.undo()
+    monkeypatch.setattr(tempfile, "tempdir", "/no/folder")
+    other = client.post(path, json={})
+    assert problem.json()["type"] == other.json()["type"] == "/problems/upload-not-stored"
+
+
+def test_no_part_of_a_body_is_missing_on_a_full_disk() -> None:
+    before, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    with uploads.upload() as (file, _):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (10, most))  # the file takes 10 bytes
+        try:
+            with pytest.raises(UploadNotStored):
+                uploads.write(file, bytes(20))
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (before, most))
 
 
 def test_what_is_released_can_be_held_again() -> None:

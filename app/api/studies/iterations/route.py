@@ -17,7 +17,7 @@ from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, StudyId, set_location
 from joulepath.app.api.shared.problem_lists import MOTION_PROBLEMS
 from joulepath.app.api.shared.reply import ServiceTasks
-from joulepath.app.api.shared.uploads import upload
+from joulepath.app.api.shared.uploads import upload, write
 from joulepath.app.api.studies.iterations.task import (
     StudyStep,
     StudyStepTask,
@@ -28,6 +28,7 @@ from joulepath.app.engine.result import StoredAnswer, TaskResult
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import FieldError, InvalidRequest
 from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownLog, UnknownStudy
+from joulepath.app.exceptions.transport import UploadNotStored
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.studies import IterationBody, IterationDetail
@@ -64,6 +65,7 @@ MOST_ITERATIONS = 2**31 - 1
             UnknownStudy,
             NotOwner,
             StoreUnavailable,
+            UploadNotStored,
         ),
     },
 )
@@ -133,7 +135,7 @@ async def _made(step: StudyStep, tasks: ServiceTasks, cache: AnswerCache) -> stu
     request_id = tasks.request_id
     if step.optimize is None:
         with upload() as (file, path):
-            file.write(step.evaluate)
+            write(file, step.evaluate)
             task = EvaluateTask(path, "json", {}, "json", request_id, tasks.deadline())
             return _iteration(step, await tasks.engine.run(task, tasks.deadline()))
     deadline = tasks.deadline(step.optimize)
