@@ -152,7 +152,7 @@ def test_a_programmer_makes_a_round_of_a_table(browser: Browser, service: Server
             for leg in legs
             if leg["kind"] == "move" and "start" in (leg["start"]["stop"], leg["goal"]["stop"])
         )
-        expect(page.locator("#notes")).to_contain_text(f"start and back take {home:.3g} of")
+        expect(page.locator("#notes")).to_contain_text(f"start and back to it take {home:.3g} of")
         expect(page.get_by_role("button", name="Leave out")).to_be_visible()
         page.locator("#export").click()
         page.locator("[data-format=movej]").click()
