@@ -223,15 +223,16 @@ def course_of(bundle: Bundle, program: Program) -> Course:
     moves, legs, t, power = iter(bundle.moves), list[Leg](), list[float](), list[float]()
     for leg in answer["legs"]:
         rests = leg["kind"] in ("dwell", "wait")
-        legs.append(
-            Leg(leg["t0"], leg["duration"], leg["electrical"], rests, leg["payload_mass"] > 0)
-        )
-        if rests:
+        move = None if rests else next(moves)
+        # a tool with a mass is no part in hand
+        loaded = move is not None and move["arm"]["payload"] is not None
+        legs.append(Leg(leg["t0"], leg["duration"], leg["electrical"], rests, loaded))
+        if move is None:
             mean = leg["electrical"] / leg["duration"]
             t += [leg["t0"], leg["t0"] + leg["duration"]]
             power += [mean, mean]
         else:
-            trajectory = next(moves)["trajectory"]
+            trajectory = move["trajectory"]
             t += [leg["t0"] + each for each in trajectory["t"]]
             power += trajectory["power"]
     stops = [Stop(each.t, each.number, each.takes) for each in stops_of(program)]

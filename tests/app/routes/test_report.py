@@ -17,8 +17,10 @@ from starlette.testclient import TestClient
 from joulepath.app.api.report.build import report_of
 from joulepath.app.api.report.bundle import Bundle, NoReport, attached_to, in_html
 from joulepath.app.api.report.check import checked
+from joulepath.app.api.report.motion_report import course_of
 from joulepath.app.api.report.numbers import amount, counted, digits, down, percent, up
 from joulepath.app.api.report.pdf import pdf
+from joulepath.app.api.report.programs import program_of
 from joulepath.app.api.report.rivals import their_energy
 from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.optimizer.dynamics.losses import saving
@@ -121,6 +123,15 @@ def test_a_cycle_shows_its_legs(client: TestClient) -> None:
         assert digits(leg["electrical"]) in text
     # no price is given
     assert "Not given: price, carbon intensity, shifts per year." in text
+
+
+def test_a_tool_is_no_part_in_hand(client: TestClient) -> None:
+    part = {"mass": 1.0, "com": [0, 0, 0.2]}
+    stops = [{"target": {"q": NEAR}, "payload": part}, {"target": {"q": HOME}, "payload": None}]
+    asked = {"start": {"q": HOME}, "stops": stops, "closed": False, "tool": "robotiq_2f_85"}
+    bundle = attached_to(reported(client, cycle=asked | {"deadline": 100.0}, advice=False))
+    assert min(leg["payload_mass"] for leg in bundle.answer["legs"]) > 0
+    assert [leg.loaded for leg in course_of(bundle, program_of(bundle)).legs] == [False, True]
 
 
 def test_changes_that_need_less_are_computed_and_checked(client: TestClient) -> None:
