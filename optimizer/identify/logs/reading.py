@@ -42,6 +42,36 @@ from joulepath.optimizer.problem.arrays import frozen
 
 
 @dataclass(frozen=True)
+class Channel:
+    """A channel of a log."""
+
+    name: str
+    column: str | None
+    """Column of the file; None for a channel computed from another one."""
+    unit: str
+    min: float
+    max: float
+    noise: float
+    """Robust standard deviation of the part above the band of the filter."""
+
+
+@dataclass(frozen=True)
+class LogReport:
+    """Findings of the reading of a log."""
+
+    rows: int
+    """Number of rows."""
+    dropped: int
+    """Number of lines dropped for their number of cells."""
+    jitter: tuple[float, float]
+    """5th and 95th percentile of the deviation of a time step [s]."""
+    channels: tuple[Channel, ...]
+    effort: EffortReport | None
+    """Meaning of the efforts; None if no efforts were logged."""
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class LogReading:
     """A log, and the report on its reading."""
 
@@ -136,7 +166,7 @@ def _read(source: Path | bytes, robot: Robot, options: LogOptions) -> LogReading
         rows=len(grid.kept),
         dropped=channels.dropped,
         jitter=grid.jitter,
-        channels=channels_of(log, columns, None if efforts is None else efforts.group),
+        channels=tuple(_channels(log, columns, None if efforts is None else efforts.group)),
         effort=None if efforts is None else efforts.report,
         warnings=(*remarks, *log_warnings(log, grid, columns)),
     )
@@ -247,7 +277,7 @@ _UNITS = {"q": "rad", "v": "rad/s", "a": "rad/s²", "power": "W", "temperature":
 _EFFORT_UNITS = {"current": "A", "torque": "N·m", "external": "N·m"}
 
 
-def channels_of(log: Log, columns: Columns, effort: ChannelName | None) -> tuple[Channel, ...]:
+def _channels(log: Log, columns: Columns, effort: ChannelName | None) -> Iterator[Channel]:
     """All channels of a log.
 
     Args:
@@ -255,10 +285,6 @@ def channels_of(log: Log, columns: Columns, effort: ChannelName | None) -> tuple
         columns: columns of the file.
         effort: group of columns of the efforts.
     """
-    return tuple(_channels(log, columns, effort))
-
-
-def _channels(log: Log, columns: Columns, effort: ChannelName | None) -> Iterator[Channel]:
     units = _UNITS | {"effort": _EFFORT_UNITS.get(log.effort_meaning or "", "")}
     sources: dict[str, ChannelName | None] = {
         "q": "q",
@@ -297,33 +323,3 @@ def _range(values: Array) -> tuple[float, float]:
     """Least and greatest value, with the digits of single precision."""
     low, high = (float(f"{each:.7g}") for each in (values.min(), values.max()))
     return low, high
-
-
-@dataclass(frozen=True)
-class Channel:
-    """A channel of a log."""
-
-    name: str
-    column: str | None
-    """Column of the file; None for a channel computed from another one."""
-    unit: str
-    min: float
-    max: float
-    noise: float
-    """Robust standard deviation of the part above the band of the filter."""
-
-
-@dataclass(frozen=True)
-class LogReport:
-    """Findings of the reading of a log."""
-
-    rows: int
-    """Number of rows."""
-    dropped: int
-    """Number of lines dropped for their number of cells."""
-    jitter: tuple[float, float]
-    """5th and 95th percentile of the deviation of a time step [s]."""
-    channels: tuple[Channel, ...]
-    effort: EffortReport | None
-    """Meaning of the efforts; None if no efforts were logged."""
-    warnings: tuple[str, ...]
