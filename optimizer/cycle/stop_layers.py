@@ -18,7 +18,6 @@ from joulepath.optimizer.cycle.legs import LEG
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
-from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace, traces_of_each
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
@@ -138,8 +137,8 @@ def layers_of_stop(cycle: Cycle, models: ModelsOfArms, k: int) -> list[Layer]:
         follows = _nodes_that_follow(cycle, origin, found, blocked)
         if not (kept & follows).any():
             attempts = _attempts(cycle, origin, found, blocked, follows)
-            few = cycle.arm.robot.nq < POSE_FREEDOMS
-            raise PathInfeasible(length, attempts, layers[path.end].name, few_joints=few)
+            name, joints = layers[path.end].name, cycle.arm.robot.nq
+            raise PathInfeasible(length, attempts, name, joints=joints)
         kept &= follows
     several = stop.path is not None and stop.path.goals is not None
     if windings and (not cycle.windings or (several and kept.sum() > LEG.most_path_nodes)):

@@ -16,6 +16,7 @@ from joulepath.optimizer.declared import (
     Unit,
 )
 from joulepath.optimizer.exceptions import MOST_LISTED, JoulepathError, NoTrajectory
+from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
 
 
 @dataclass(frozen=True)
@@ -155,8 +156,8 @@ class PathInfeasible(JoulepathError):
     """`path`; or `stops/` and the name of the stop whose path it is, or with its line."""
     in_parts: Annotated[bool, Internal] = False
     """Whether several configurations, one after the other, do not lead along the path either."""
-    few_joints: Annotated[bool, Internal] = False
-    """Whether the arm has fewer than six joints, and so keeps an orientation on few paths."""
+    joints: Annotated[int, Internal] = POSE_FREEDOMS
+    """Number of joints of the arm; with fewer than six, it keeps an orientation on few paths."""
 
     def __post_init__(self) -> None:
         self.attempts = sorted(self.attempts, key=lambda each: -each.followed)[:MOST_LISTED]
@@ -175,7 +176,7 @@ class PathInfeasible(JoulepathError):
                 "Some place of it is out of reach in all of them, so that it cannot be "
                 "divided: move it."
             )
-        if self.few_joints and best.reason == "unreachable":
+        if self.joints < POSE_FREEDOMS and best.reason == "unreachable":
             remedy = (
                 "An arm of fewer than six joints keeps its orientation on few paths only: choose "
                 "one of them, or send positions alone to POST /ik/path."

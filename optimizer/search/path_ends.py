@@ -14,7 +14,6 @@ from joulepath.optimizer.bounds.missed_branches import bound_of_missed_branches
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
-from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
 from joulepath.optimizer.kinematics.tool_path.course_tracing import (
     Trace,
     traces,
@@ -69,8 +68,7 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
                 continue
         attempts.append(attempt_of(limits, start, trace))
     if not found:
-        few = prepared.arm.robot.nq < POSE_FREEDOMS
-        raise PathInfeasible(course.length, attempts, few_joints=few)
+        raise PathInfeasible(course.length, attempts, joints=prepared.arm.robot.nq)
     return found
 
 
