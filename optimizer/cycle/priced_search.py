@@ -63,10 +63,20 @@ def priced_motion(
     Returns:
         The motion; None if none is found before the deadline.
     """
-    weights = {leg.prepared.problem.objective: 1.0}
-    p = leg.prepared.parameters(**weights, time=price)
+    p = leg.prepared.parameters(**{leg.prepared.problem.objective: 1.0}, time=price)
     interval = DurationInterval(p, DURATIONS.least, longest, price=price)
-    return _recalled_or_solved(leg, s, g, interval, deadline, guess)
+    problem = replace(
+        leg.prepared.problem, start=leg.start.q[s], goal=leg.goal.q[g], passes=leg.passes(s, g)
+    )
+    motions, start = known_motions(), None if guess is None else sampled(guess)
+    key = motions.key("priced", problem, interval, start)
+    known = motions.recall(key)
+    result = known.result if known is not None else _solve(leg, s, g, interval, deadline, guess)
+    if result is None or result.spline is None:
+        return None
+    if not result.cut_short:
+        motions.keep(key, KnownMotion(result.spline, result.stationarity))
+    return PricedMotion(result.spline, leg.prepared.cost_of(result.spline))
 
 
 class PricedPair:
@@ -160,28 +170,6 @@ def fastest_motion(
     if not search.cut_short:
         motions.keep(key, KnownMotion(spline, None))
     return PricedMotion(spline, leg.prepared.cost_of(spline))
-
-
-def _recalled_or_solved(
-    leg: Leg,
-    s: int,
-    g: int,
-    interval: DurationInterval,
-    deadline: Deadline,
-    guess: Spline | None = None,
-) -> PricedMotion | None:
-    problem = replace(
-        leg.prepared.problem, start=leg.start.q[s], goal=leg.goal.q[g], passes=leg.passes(s, g)
-    )
-    motions, asked = known_motions(), (interval, None if guess is None else sampled(guess))
-    key = motions.key("priced", problem, *asked)
-    known = motions.recall(key)
-    result = known.result if known is not None else _solve(leg, s, g, interval, deadline, guess)
-    if result is None or result.spline is None:
-        return None
-    if not result.cut_short:
-        motions.keep(key, KnownMotion(result.spline, result.stationarity))
-    return PricedMotion(result.spline, leg.prepared.cost_of(result.spline))
 
 
 def _solve(

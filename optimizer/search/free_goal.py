@@ -27,10 +27,7 @@ from joulepath.optimizer.search.attempts import settled, solver_of
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
 from joulepath.optimizer.search.state import SearchState
-from joulepath.optimizer.solve.methods.duration_intervals import (
-    DurationInterval,
-    duration_intervals,
-)
+from joulepath.optimizer.solve.methods.duration_intervals import interval_around
 from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
@@ -188,7 +185,7 @@ def _solved(
     fresh = with_ends(prepared, to_end, candidate.q_start, q_goal)
     if fresh is None:
         return None
-    solver = solver_of(state, fresh, _interval_of(prepared, q_goal, guess.duration))
+    solver = solver_of(state, fresh, interval_around(prepared, q_goal, guess.duration))
     guess.points[-REST_POINTS:] = q_goal
     # a method without free control points takes the goal of the guess alone
     result = state.add_effort(
@@ -221,7 +218,7 @@ def _proposal(
     coordinates = Coordinates.joints(
         candidate.q_start, candidate.q_goal, prepared.problem.arm.active_limits
     )
-    interval = _interval_of(prepared, candidate.q_goal, spline.duration)
+    interval = interval_around(prepared, candidate.q_goal, spline.duration)
     pose = candidate.goal.tolerance
     if pose is None:
         allowed = held_pose(prepared, candidate.q_goal, radius)
@@ -246,14 +243,6 @@ def _proposal(
     if not result.feasible:
         return None, np.inf
     return Guess(space, program.points(result.free), result.duration), result.cost
-
-
-def _interval_of(prepared: PreparedProblem, q_goal: Array, duration: float) -> DurationInterval:
-    """The interval of durations that holds a duration [s], else the nearest interval."""
-    return min(
-        duration_intervals(prepared, q_goal),
-        key=lambda each: max(each.t_min - duration, duration - each.t_max, 0.0),
-    )
 
 
 def held_pose(prepared: PreparedProblem, q_goal: Array, radius: float) -> GoalConstraints:

@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 
 from joulepath.optimizer.dynamics.plant import has_corners
-from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import Spline, retimed, sampled
 from joulepath.optimizer.search.attempts import improve, solve_from
 from joulepath.optimizer.search.candidates import Candidate
@@ -86,8 +85,8 @@ def refine(state: SearchState, candidate: Candidate, graded_below: float = np.in
     sharpen(state, candidate)
     if method.may_refine(candidate.spline) and not deadline.passed:
         coarse = candidate.spline
-        exact = lasts_below(FREE_SPLINE.exact_below, state, candidate)
-        tight = lasts_below(SPLINE_SPACES.tight, state, candidate)
+        exact = state.lasts_below(FREE_SPLINE.exact_below, candidate)
+        tight = state.lasts_below(SPLINE_SPACES.tight, candidate)
         if tight and slides(state.prepared, candidate):
             follow_switches(state, candidate)
         else:
@@ -169,7 +168,7 @@ def start_from_fastest(
         durations = (0.0, candidate.spline.duration)
     elif (
         not slides(state.prepared, candidate)
-        and lasts_below(SPLINE_SPACES.tight, state, candidate)
+        and state.lasts_below(SPLINE_SPACES.tight, candidate)
         and _costs_more_than_promised(state, candidate, settings)
     ):
         durations = (0.0,)
@@ -185,7 +184,7 @@ def _solve_from_fastest(duration: float, solver: Method) -> SolveResult:
 def _is_held_back(state: SearchState, candidate: Candidate, settings: FastestStartSettings) -> bool:
     """Whether path constraints make a motion much slower than the limits of its joints."""
     path, spline = state.prepared.path, candidate.spline
-    if path is None or lasts_below(settings.held_back, state, candidate):
+    if path is None or state.lasts_below(settings.held_back, candidate):
         return False
     q, t = sampled(spline)
     return bool(path.ratios(q, spline.curve(t, 1)).max() > settings.active)
@@ -270,17 +269,6 @@ def _is_elsewhere(state: SearchState, rival: Candidate, settings: RivalSettings)
         np.abs(np.concatenate([each.q_start, each.q_goal]) - ends).max() > settings.distinct
         for each in state.candidates
         if each.refined
-    )
-
-
-def lasts_below(ratio: float, state: SearchState, candidate: Candidate) -> bool:
-    """Whether a motion takes less than a multiple of the shortest duration of its joints.
-
-    Then its jerk switches nearly as in the fastest motion.
-    """
-    displacement = candidate.q_goal - candidate.q_start
-    return candidate.spline.duration < ratio * float(
-        shortest_duration(displacement, state.problem.arm.active_limits)
     )
 
 

@@ -23,7 +23,6 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.plant import SMOOTHING, has_corners
-from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import Spline, lasting, sampled
 from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.search.attempts import attempted, context_of, solve_from
@@ -32,7 +31,7 @@ from joulepath.optimizer.search.random_displacements import random_displacements
 from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.duration_intervals import (
     DurationInterval,
-    duration_intervals,
+    interval_around,
 )
 
 
@@ -123,7 +122,7 @@ def sharpen(state: SearchState, best: Candidate) -> None:
     problem = state.problem
     if not state.method.evenly_spaced or not has_corners(problem.objective, problem.arm):
         return
-    if _is_nearly_fastest(state, best):
+    if state.lasts_below(SHARPENING.fast_ratio, best):
         return
     if (
         len(best.spline.control_points) == SHARPENING.dense_points
@@ -146,15 +145,12 @@ def sharpen(state: SearchState, best: Candidate) -> None:
     for rival in rivals:
         _Follower(state, rival).follow(restarts=0, ahead=ahead)
     best = state.best() or best
-    if not mechanical and _is_nearly_fastest(state, best) and not state.deadline.passed:
+    if (
+        not mechanical
+        and state.lasts_below(SHARPENING.fast_ratio, best)
+        and not state.deadline.passed
+    ):
         solve_from(state, best, sampled(best.spline), fine=True)
-
-
-def _is_nearly_fastest(state: SearchState, candidate: Candidate) -> bool:
-    """Whether the motion of a candidate is so fast that it switches at its limits."""
-    displacement = candidate.q_goal - candidate.q_start
-    shortest = shortest_duration(displacement, state.problem.arm.active_limits)
-    return candidate.spline.duration < SHARPENING.fast_ratio * float(shortest)
 
 
 def follow_in_time(state: SearchState, candidate: Candidate, best: float) -> None:
@@ -311,10 +307,8 @@ class _Follower:
 
         Rest needs no mechanical work: no duration needs less than the longest.
         """
-        intervals = duration_intervals(self.state.prepared, self.candidate.q_goal, width=width)
-        interval = min(
-            intervals, key=lambda each: max(each.t_min - duration, duration - each.t_max)
-        )
+        prepared, q_goal = self.state.prepared, self.candidate.q_goal
+        interval = interval_around(prepared, q_goal, duration, width)
         return (
             replace(interval, t_min=interval.t_max)
             if self.state.problem.objective == "mechanical"

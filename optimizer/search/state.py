@@ -12,6 +12,7 @@ import numpy as np
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import Spline, lasting
 from joulepath.optimizer.prepared_problem import ArmModels, PreparedProblem
 from joulepath.optimizer.problem.problem import DURATIONS, Problem, narrowed
@@ -203,6 +204,16 @@ class SearchState:
                 return energy if self.certified(candidate, spline, energy).valid else None
         except DeadlinePassed:
             return None
+
+    def lasts_below(self, ratio: float, candidate: Candidate) -> bool:
+        """Whether the motion of a candidate takes less than a multiple of the shortest duration of
+        its joints.
+
+        Then its jerk switches nearly as in the fastest motion.
+        """
+        displacement = candidate.q_goal - candidate.q_start
+        shortest = shortest_duration(displacement, self.problem.arm.active_limits)
+        return candidate.spline.duration < ratio * float(shortest)
 
     def tell_candidates(self) -> None:
         """Tell the number of candidates."""

@@ -95,6 +95,22 @@ def duration_intervals(
     ]
 
 
+def interval_around(
+    prepared: PreparedProblem,
+    q_goal: Array,
+    duration: float,
+    width: float = SMOOTHING.power_width,
+) -> DurationInterval:
+    """The interval of a problem that holds a duration [s], else the nearest one.
+
+    `q_goal` and `width` are those of `duration_intervals`.
+    """
+    return min(
+        duration_intervals(prepared, q_goal, width=width),
+        key=lambda each: max(each.t_min - duration, duration - each.t_max, 0.0),
+    )
+
+
 def _goal_holding(
     prepared: PreparedProblem, dwell: Dwell, hold: float, piece: LinearDwell
 ) -> GoalHolding:
