@@ -104,6 +104,17 @@ class FrictionLaw:
             + self.viscous * v
         )
 
+    def loss_slope(self, v: Array) -> Array:
+        """Derivative by v (..., nq) ≥ 0 [rad/s] of the loss without Coulomb's, v (curved asinh(v /
+        speed) + viscous v), shape (..., nq) [N·m]."""
+        bent = self.curved * (np.arcsinh(v / self.speed) + v / np.hypot(v, self.speed))
+        return np.asarray(bent + 2 * self.viscous * v)
+
+    def loss_curvature(self, v: Array) -> Array:
+        """Derivative of `loss_slope` by v (..., nq), falling in v, shape (..., nq) [N·m·s/rad]."""
+        bent = self.curved * (v**2 + 2 * self.speed**2) / np.hypot(v, self.speed) ** 3
+        return np.asarray(bent + 2 * self.viscous)
+
     @property
     def unloaded(self) -> FrictionLaw:
         """The law without load dependence, a lower bound since `load` is never negative."""

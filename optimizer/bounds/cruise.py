@@ -53,7 +53,7 @@ class Cruise:
             Speeds c (P, nq) [rad/s], and the time of the jerk ramps (P, nq) [s]; 0 for a speed
             below that of the ramp, for which the jerk limit is left out.
         """
-        T = T[:, None]
+        T = T[..., None]
         moving, spread = T - self.jerk_ramp, self.distance * (4 / self.a)
         ramps = 4 * self.jerk_ramp * self.ramp_speed / self.a
         with_jerk = (
@@ -66,28 +66,43 @@ class Cruise:
     def losses(self, T: Array) -> tuple[Array, Array, Array, Array]:
         """Least losses for durations T (P,) [s].
 
-        By parts, ∫ g' (T - 2 t) dh = T g(c) - 2 ∫ g' t dh.
-
         Returns:
             Friction loss (P,) [J], its derivative by T [W], ∫ v² / c dt (P,), its derivative by T.
         """
-        (v, ramp), law = self.speed(T), self.friction
-        rise, square = np.arcsinh(v / law.speed), v * v
+        v, ramp = self.speed(T)
+        friction, slope, squares = self.joint_losses(T, v, ramp)
+        square = v * v
+        return friction.sum(axis=1), slope.sum(axis=1), squares @ self.copper, -square @ self.copper
+
+    def joint_losses(self, T: Array, v: Array, ramp: Array) -> tuple[Array, Array, Array]:
+        """Least losses of each joint for durations T (P,) [s].
+
+        By parts, ∫ g' (T - 2 t) dh = T g(c) - 2 ∫ g' t dh.
+
+        Args:
+            T: durations, shape (P,) [s].
+            v: speeds c of `speed`, shape (P, nq) [rad/s].
+            ramp: times of jerk ramps of `speed`, shape (P, nq) [s].
+
+        Returns:
+            Friction loss [J], its derivative by T [W], and ∫ v² dt, shape (P, nq).
+        """
+        law, rise, square = self.friction, np.arcsinh(v / self.friction.speed), v * v
         bent = np.sqrt(square + law.speed**2)
         torque = law.curved * rise + law.viscous * v
         integral_of_g = (
             law.curved * ((square / 2 + law.speed**2 / 4) * rise - v * bent / 4)
             + law.viscous * v * square / 3
         )
-        friction = T[:, None] * v * torque - self.slowness * (square * torque - integral_of_g)
+        friction = T[..., None] * v * torque - self.slowness * (square * torque - integral_of_g)
         friction -= ramp * (v * torque - self._ramp_loss)
         squares = (
-            T[:, None] * square
+            T[..., None] * square
             - self.slowness * (2 / 3) * v * square
             - ramp * (square - self.ramp_speed**2)
         )
         slope = -(law.curved * square / bent + law.viscous * square)
-        return friction.sum(axis=1), slope.sum(axis=1), squares @ self.copper, -square @ self.copper
+        return friction, slope, squares
 
     @cached_property
     def _ramp_loss(self) -> Array:
@@ -106,5 +121,5 @@ class EvenTravel(Cruise):
 
     def speed(self, T: Array) -> tuple[Array, Array]:
         """Even speeds (P, nq) [rad/s] for durations T (P,) [s]; no jerk ramps."""
-        even = self.distance / T[:, None]
+        even = self.distance / T[..., None]
         return even, np.zeros_like(even)

@@ -92,8 +92,4 @@ class FrictionConjugate:
 
         It is the unit of the weights of a dual bound, whose validity does not depend on it.
         """
-        v = self.last
-        bent = np.hypot(v, law.speed)
-        return np.asarray(
-            (2 * (law.curved / bent + law.viscous) - law.curved * v * v / bent**3).min(axis=0)
-        )
+        return np.asarray(law.loss_curvature(self.last).min(axis=0))

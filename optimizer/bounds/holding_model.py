@@ -60,7 +60,7 @@ class HoldingModel:
     def bent(self) -> Array:
         """Least second derivative of v curved asinh(v / speed), shape (nq,)."""
         law, v = self.arm.friction_law, self.arm.active_limits.v_max
-        return np.asarray(law.curved * (v**2 + 2 * law.speed**2) / np.hypot(v, law.speed) ** 3)
+        return law.loss_curvature(v) - 2 * law.viscous
 
     @cached_property
     def greatest(self) -> Array:

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.bounds.cruise import Cruise
 from joulepath.optimizer.bounds.holding_model import HOLDING, LEAST_DIVISOR, HoldingModel
 from joulepath.optimizer.bounds.straight_line import Line
 from joulepath.optimizer.collision.bodies import Indices
@@ -71,43 +72,17 @@ class HoldingTerms:
         self.T = (self.first + self.last) / 2
         self.d = np.abs(line.d)[:, None]
         self.sign = np.where(line.d < 0, -1.0, 1.0)[:, None]
-        self.slowness = 2 / self.limits.a_max
-        self._fill()
-
-    def _fill(self) -> None:
-        """Speeds c of the fill, ∫ b² dt, ∫ asinh(b / s) dt and ∫ g(b) dt.
-
-        By parts, the last is T g(c) - 2 ∫ g' t dh.
-        """
-        a, law = self.limits.a_max, self.law
-        jerk = a / self.limits.j_max
-        start = a * jerk / 2
-        moving, spread = self.T - jerk, self.d * (4 / a)
-        root = np.sqrt(np.maximum(moving * moving + 4 * jerk * start / a - spread, 0.0))
-        with_jerk = a / 2 * (moving - root)
-        without = a / 2 * (self.T - np.sqrt(np.maximum(self.T * self.T - spread, 0.0)))
-        self.ramped = with_jerk > start
-        self.jerk, self.start = np.where(self.ramped, jerk, 0.0), start
-        self.c = c = np.where(self.ramped, with_jerk, without)
-        s, self.rise = law.speed, np.arcsinh(c / law.speed)
-        bent, square = np.hypot(c, s), c * c
-        self.square = (
-            self.T * square - self.slowness * (2 / 3) * c * square - self.jerk * (square - start**2)
-        )
+        cruise, T = Cruise(self.d, arm), self.T[..., 0]
+        self.c, self.jerk = cruise.speed(T)
+        self.friction, self.friction_slope, self.square = cruise.joint_losses(T, self.c, self.jerk)
+        self.start, self.slowness = cruise.ramp_speed, cruise.slowness
+        s, self.rise = self.law.speed, np.arcsinh(self.c / self.law.speed)
+        # ∫ asinh(b / s) dt, by parts
         self.asinh = (
             self.T * self.rise
-            - self.slowness * (bent - s)
-            - self.jerk * (self.rise - np.arcsinh(start / s))
+            - self.slowness * (np.hypot(self.c, s) - s)
+            - self.jerk * (self.rise - np.arcsinh(self.start / s))
         )
-        torque = law.curved * self.rise + law.viscous * c
-        integral_of_g = (
-            law.curved * ((square / 2 + s * s / 4) * self.rise - c * bent / 4)
-            + law.viscous * c * square / 3
-        )
-        initial = start * (law.curved * np.arcsinh(start / s) + law.viscous * start)
-        self.friction = self.T * c * torque - self.slowness * (square * torque - integral_of_g)
-        self.friction -= self.jerk * (c * torque - initial)
-        self.friction_slope = -(law.curved * square / bent + law.viscous * square)
 
     def _mean_friction(self) -> Array:
         """∫ f(b) dt (P, C, nq), for joints that move."""
@@ -191,7 +166,7 @@ class HoldingTerms:
         bending, is_stiff = self._bending(omega, k, half)
         valid &= is_stiff
         value = value - np.abs(slope) * half_cell - bending
-        rate = more * (law.coulomb + self._torque()) + sign * (
+        rate = more * (law.coulomb + self.law.loss_slope(self.c)) + sign * (
             law.viscous + law.curved / np.hypot(self.c, law.speed)
         )
         rate = (
@@ -244,14 +219,6 @@ class HoldingTerms:
         slope = np.where(up, rise_slope - size * law.coulomb * (1 + knee), -size * law.coulomb)
         slope = slope + sign * law.curved * (self.rise - self.c / np.hypot(self.c, law.speed))
         return _Push(up, work, slope, rise_rate)
-
-    def _torque(self) -> Array:
-        """(v g(v))' of friction without Coulomb's, at c."""
-        law = self.law
-        return np.asarray(
-            law.curved * (self.rise + self.c / np.hypot(self.c, law.speed))
-            + 2 * law.viscous * self.c
-        )
 
     def _rise(self, delta: Array, rest: Array) -> tuple[Array, Array, Array]:
         """Contribution of the slope 2 δ (v* - v) to ∫ Φ̂ dt, (P, C, nq).

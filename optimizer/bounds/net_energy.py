@@ -247,5 +247,5 @@ def most_copper(arm: Arm) -> float:
     law, v, c = arm.friction_law, arm.active_limits.v_max, copper_loss(arm)
     if min(law.coulomb.min(), law.curved.min(), law.viscous.min()) < 0:
         return 0.0
-    bent = law.curved * (v**2 + 2 * law.speed**2) / np.hypot(v, law.speed) ** 3 + 2 * law.viscous
+    bent = law.loss_curvature(v)
     return float((c * bent + np.sqrt(c * bent * (c * bent + 2))).min()) / 2

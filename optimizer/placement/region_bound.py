@@ -315,19 +315,13 @@ def prices_of_travel(arm: Arm, power: float) -> tuple[Array, Array]:
     if power < 0:
         return np.full_like(share, -np.inf), np.zeros_like(share)
     weights = (1 - share)[:, None] * levers(arm) + share[:, None]
-    steepest = (power / v_max + law.coulomb + _slope(law, v_max)).sum()
+    steepest = (power / v_max + law.coulomb + law.loss_slope(v_max)).sum()
     low, high = np.zeros_like(share), steepest / weights.max(axis=1)
     for _ in range(REGION_BOUND.bisections):
         middle = (low + high) / 2
         holds = power + _least_power(law, middle[:, None] * weights, v_max) >= 0
         low, high = np.where(holds, middle, low), np.where(holds, high, middle)
     return low * (1 - share), low * share
-
-
-def _slope(law: FrictionLaw, v: Array) -> Array:
-    """Derivative (nq,) [N·m] of φ less Coulomb friction at the speeds v (nq,) [rad/s]."""
-    bent = law.curved * (np.arcsinh(v / law.speed) + v / np.hypot(v, law.speed))
-    return np.asarray(bent + 2 * law.viscous * v)
 
 
 def _least_power(law: FrictionLaw, weights: Array, v_max: Array) -> Array:
@@ -338,10 +332,10 @@ def _least_power(law: FrictionLaw, weights: Array, v_max: Array) -> Array:
     low, high = np.zeros_like(weights), np.broadcast_to(v_max, weights.shape)
     for _ in range(REGION_BOUND.bisections):
         middle = (low + high) / 2
-        falls = law.coulomb + _slope(law, middle) < weights
+        falls = law.coulomb + law.loss_slope(middle) < weights
         low, high = np.where(falls, middle, low), np.where(falls, high, middle)
     v = (low + high) / 2
     value = v * (law.coulomb + law.curved * np.arcsinh(v / law.speed) + law.viscous * v)
-    slope = law.coulomb + _slope(law, v) - weights
+    slope = law.coulomb + law.loss_slope(v) - weights
     least = np.minimum(-slope * v, slope * (v_max - v))
     return np.asarray((value - weights * v + np.minimum(least, 0.0)).sum(axis=-1))
