@@ -42,9 +42,6 @@ class GoalRefinementSettings:
 
     rounds: int = 8
     """Largest number of rounds."""
-    last_rounds: int = 2
-    """Largest number of rounds from a refined motion, which touches other limits than the coarse
-    motion: in 5 of 24 random requests, another goal then saved 0.08 to 0.2 %."""
     radius: float = 0.6
     """First trust region of a goal joint [rad]."""
     least_radius: float = 0.01
@@ -92,18 +89,7 @@ def refine_goals(state: SearchState) -> list[Candidate]:
     )
 
 
-def refine_goal_again(state: SearchState, refined: Candidate) -> None:
-    """Append the refined candidate with its goal moved once more, if it needs less energy."""
-    if refined.goal.tolerance is None:
-        return
-    moved = refine_goal(state, refined, GOALS.last_rounds)
-    if moved is not refined:
-        moved.refined = True
-        state.candidates.append(moved)
-        state.tell_best()
-
-
-def refine_goal(state: SearchState, candidate: Candidate, rounds: int = GOALS.rounds) -> Candidate:
+def refine_goal(state: SearchState, candidate: Candidate) -> Candidate:
     """The candidate with its goal moved over the goal set while the energy decreases.
 
     It is the candidate itself if the energy never decreases.
@@ -111,10 +97,9 @@ def refine_goal(state: SearchState, candidate: Candidate, rounds: int = GOALS.ro
     Args:
         state: state of the search.
         candidate: solved candidate whose goal is a sample.
-        rounds: largest number of rounds.
     """
     best, radius = candidate, GOALS.radius
-    for _ in range(rounds):
+    for _ in range(GOALS.rounds):
         if state.deadline.passed or radius < GOALS.least_radius:
             break
         try:

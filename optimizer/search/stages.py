@@ -96,16 +96,14 @@ def refine_sampled_ends(state: SearchState) -> None:
 
 
 def refine_best(state: SearchState) -> None:
-    """Refine the incumbent, and the motions of candidates with a prospect of less energy."""
+    """Refine the incumbent, and candidates with sliding ends that may become better."""
     best = state.best()
     if best is None or best.refused:
         return
     best = start_beside(state, best)
     coarse = best.energy or 0.0
-    saved = refine(state, best)
-    refine_rivals(state, best, coarse, saved)
-    if state.method.most_solved is None:
-        free_goal.refine_goal_again(state, state.best() or best)
+    refine(state, best)
+    refine_rivals(state, best, coarse)
     start_from_free_duration(state, state.best() or best)
 
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from benchmarks.agreement import request
-from benchmarks.tasks import collision_free
 from joulepath import Arm, Bus, ConeOrientedPose, Pose, Problem, load_robot, optimize
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
@@ -19,7 +18,7 @@ from joulepath.optimizer.search import refinement
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.least_duration_ends import with_shorter_duration
-from joulepath.optimizer.search.refinement import FastestStartSettings, refine, start_from_fastest
+from joulepath.optimizer.search.refinement import refine, start_from_fastest
 from joulepath.optimizer.search.sampled_ends import fastest_samples
 from joulepath.optimizer.search.state import ENERGY_TOLERANCE, SearchState
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
@@ -28,11 +27,9 @@ from tests.optimizer.moves import AMPLE, problem
 from tests.optimizer.search.runs import prepared
 from tests.selection import long_but
 
-# requests of the benchmark: two motions held back by the speed limit of the TCP, and one with an
-# NLP cost 0.15 % below the motion's energy
+# requests of the benchmark: motions held back by the speed limit of the TCP
 HELD_BACK_TO_POSE = 37
 HELD_BACK = 16
-ENDED_EARLY = 34
 
 
 def asked(index: int) -> Problem:
@@ -64,16 +61,12 @@ def from_fastest(state: SearchState, best: Candidate) -> float:
     return min(state.prepared.cost_of(each.spline) for each in found if each.spline is not None)
 
 
-@pytest.mark.parametrize(
-    "index", long_but([HELD_BACK], [HELD_BACK_TO_POSE, HELD_BACK, ENDED_EARLY])
-)
+@pytest.mark.parametrize("index", long_but([HELD_BACK], [HELD_BACK_TO_POSE, HELD_BACK]))
 def test_an_answer_needs_no_more_than_what_the_time_optimal_motion_leads_to(index: int) -> None:
     state, best = refined(asked(index))
     least = from_fastest(state, best)
-    # The refined motion alone is not the answer. Whether a solve ends early depends on the rounding
-    # of the kernels, and thereby on the compiler.
-    assert best.energy is not None
-    assert index == ENDED_EARLY or least < best.energy * (1 - 5e-4)
+    # the refined motion alone is not the answer
+    assert best.energy is not None and least < best.energy * (1 - 5e-4)
     found = optimize(asked(index))
     assert found.certificate.valid
     assert found.energy.electrical.total <= least * (1 + ENERGY_TOLERANCE)
@@ -106,20 +99,6 @@ def test_a_motion_that_nothing_holds_back_is_not_solved_again(given: dict[str, o
     solves, energy = state.solves, best.energy
     start_from_fastest(state, best)
     assert (state.solves, best.energy) == (solves, energy)
-
-
-@pytest.mark.parametrize("slides", [True, False])
-def test_a_broken_promise_starts_another_solve_between_fixed_ends_alone(slides: bool) -> None:
-    robot, rng = load_robot("panda"), np.random.default_rng([0, 4])
-    arm = Arm(robot=robot)
-    start, goal = collision_free(rng, robot), collision_free(rng, robot)
-    to = Pose(tcp_pose(arm, goal)) if slides else goal
-    run = prepared(Problem(arm=arm, start=start, goal=to, deadline=AMPLE))
-    run.explore()
-    best, solves = run.state.best(), run.state.solves
-    assert best is not None
-    start_from_fastest(run.state, best, FastestStartSettings(broken_promise=-1.0))
-    assert (run.state.solves == solves) is slides
 
 
 # m, rad: the certificate's tolerance at an end

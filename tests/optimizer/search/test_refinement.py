@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 
 from benchmarks.agreement import P95, request
-from joulepath import Arm, Bus, ConeOrientedPose, Problem, load_robot, optimize
+from joulepath import Arm, Bus, Problem, load_robot, optimize
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.search import free_goal
 from joulepath.optimizer.search.attempts import solve
 from joulepath.optimizer.search.branch_and_bound import explore
 from joulepath.optimizer.search.sharpening import sharpen
@@ -24,7 +23,7 @@ from joulepath.optimizer.search.sharper_cost import SHARPER_COST, SharperCostSet
 from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from tests.optimizer.clocks import still
-from tests.optimizer.moves import AMPLE, PAYLOAD, ROBOT, fixed, problem, tcp_pose
+from tests.optimizer.moves import AMPLE, PAYLOAD, ROBOT, fixed, problem
 from tests.optimizer.search.runs import prepared
 
 # relative: a spline is slower than its original motion by Ruckig if jumps of jerk are close
@@ -63,24 +62,6 @@ def test_a_better_baseline_is_taken_even_if_rounding_breaks_a_limit() -> None:
     found = optimize(problem(*CLOSE_JUMPS, robot=load_robot("gen3")))
     assert found.certificate.valid
     assert min(each.saving for each in found.baselines if each.within_limits) > -MERGED
-
-
-def test_the_goal_moves_once_more_after_the_refinement(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The search adjusts a free goal once more after the refinement of the motion.
-
-    The refined motion touches other limits than the coarse motion did, and another goal saves 0.13
-    %.
-    """
-    rng = np.random.default_rng(13)
-    q_start, q_goal = ELBOW_UP + rng.uniform(-0.8, 0.8, (2, 6))
-    position = tcp_pose(q_goal).T[:3, 3]
-    down = ConeOrientedPose(position, np.array([0.0, 0, 1]), np.array([0.0, 0, -1]), np.pi)
-    asked = problem(q_start, down)
-    found = optimize(asked, still)
-    monkeypatch.setattr(free_goal, "refine_goal_again", lambda *_: None)
-    before = optimize(asked, still)
-    assert found.energy.electrical.total < before.energy.electrical.total * (1 - SAVED)
-    assert found.certificate.valid
 
 
 @pytest.mark.long
