@@ -25,22 +25,15 @@ u, U ≤ u + R, so l = min u + R + K_max with the greatest kinetic energy K_max 
 speed and acceleration: the centre of mass of each link is at most as fast as Σ_j |v_j| times its
 greatest distance from the axis of joint j, and the link turns at most at Σ_j |v_j|.
 
-**Travel.** From (2) with l = min(U_0, U_1), E(t) ≤ e = (W + U_0 + U_1) / 2 at all times. The mass
-matrix is the sum of the rotors' D = diag(rotor inertia) and the links', which is positive
-semidefinite. With |v|_D² = vᵀ D v,
+**Travel.** In weightlessness U is constant, and from (2) K ≤ W / 2 at all times. The mass matrix is
+the sum of the rotors' D = diag(rotor inertia) and the links', which is positive semidefinite. With
+|v|_D² = vᵀ D v and A = |a_max|_D, as v starts and ends at zero,
 
-    |q_1 - q_0|_D ≤ ∫ |v|_D dt ≤ ∫ min( sqrt(2 max(e - U(q(t)), 0)), A min(t, T - t) ) dt,  (3)
+    |q_1 - q_0|_D ≤ ∫ |v|_D dt ≤ ∫ min(s, A min(t, T - t)) dt = s T - s² / A,  s = sqrt(W).   (3)
 
-A = |a_max|_D, as v starts and ends at zero. The time for falling bounds U from below: joint j is at
-most s_j(t) = min(v_max t, a_max t² / 2, j_max t³ / 6) from its start, and |∂U/∂q_j| ≤ G_j, the
-weight of the links that it carries times their greatest distances from its axis (zero for the
-joints before k). So
-
-    U(q(t)) ≥ max(U_0 - Σ_j G_j s_j(t), U_1 - Σ_j G_j s_j(T - t), least u - R).
-
-The right-hand side of (3) grows with e. The least e for which (3) holds gives W ≥ 2 e - U_0 - U_1.
-A sum of upper bounds on cells replaces the integral. A motion that takes less than T and then rests
-until T does the same work: the bound for the longest allowed duration holds for all.
+The least s for which (3) holds gives W ≥ s². A motion that takes less than T and then rests until T
+does the same work: the bound for the longest allowed duration holds for all. Under gravity, a fall
+may pay for the speed: for random motions of common arms, such a bound never exceeded the others.
 
 The bound is not tight for a motion in which one joint takes up the energy that gravity gives to
 another, because (1) adds up the joints before the absolute value, nor for a motion that could swing
@@ -64,10 +57,6 @@ from joulepath.optimizer.problem.problem import DURATIONS
 class MechanicalSettings:
     """Settings of the mechanical bound."""
 
-    cells: int = 32
-    """Number of cells of the integral in (3)."""
-    bisections: int = 30
-    """Number of halvings of the interval that holds the energy e."""
     parallel: float = 1e-8
     """Sine of the angle below which an axis is parallel to gravity: rounding of a placement."""
     rounding: float = 1e-7
@@ -133,13 +122,6 @@ class EnergyRange:
         return None
 
     @cached_property
-    def slopes(self) -> Array:
-        """Greatest |∂U/∂q_j| (nq,) [J/rad]."""
-        slopes = float(np.linalg.norm(self.gravity)) * (self.lengths @ self.masses)
-        slopes[: self.model.nq if self.leading is None else self.leading] = 0.0
-        return np.asarray(slopes)
-
-    @cached_property
     def lumped(self) -> tuple[Array, float, float]:
         """The wave (a, b) [J], the constant and R [J]: |U(q) - constant - a cos q_k - b sin q_k| ≤
         R.
@@ -195,30 +177,14 @@ class EnergyRange:
         links = (v @ self.lengths) ** 2 @ self.masses + np.cumsum(v, axis=1) ** 2 @ spin
         return np.asarray((rotors + links) / 2)
 
-    def fall(self, ends: Array, least: Array, duration: Array) -> tuple[Array, Array]:
-        """Least potential energies and A min(t, T - t) in the cells of motions, both (P, cells).
-
-        Args:
-            ends: potential energies of start and goal, shape (P, 2) [J].
-            least: least potential energies of all configurations, shape (P,) [J].
-            duration: durations, shape (P,) [s].
-        """
-        limits = self.prepared.problem.arm.active_limits
-        edges = duration[:, None] * np.linspace(0.0, 1.0, MECHANICAL.cells + 1)
-        left, right = edges[:, :-1], edges[:, 1:]
-
-        def fallen(t: Array) -> Array:
-            t = t[..., None]
-            rates = np.minimum(
-                np.minimum(limits.v_max * t, limits.a_max * t**2 / 2), limits.j_max * t**3 / 6
-            )
-            return np.asarray(rates @ self.slopes)
-
-        near = np.maximum(
-            ends[:, :1] - fallen(right), ends[:, 1:] - fallen(duration[:, None] - left)
-        )
-        most = float(np.sqrt(limits.a_max**2 @ self.prepared.problem.arm.drives.rotor_inertia))
-        return np.maximum(near, least[:, None]), most * np.minimum(right, duration[:, None] - left)
+    def work_of_travel(self, displacement: Array, duration: Array) -> Array:
+        """Least work (P,) [J] by (3) of displacements (P, nq) [rad] in durations (P,) [s]."""
+        rotors = self.prepared.problem.arm.drives.rotor_inertia
+        needed = np.sqrt(displacement**2 @ rotors)
+        most = float(np.sqrt(self.prepared.problem.arm.active_limits.a_max**2 @ rotors))
+        spare = np.sqrt(np.maximum(duration**2 - 4 * needed / most, 0.0))
+        # the root A / 2 (T - spare) without a difference of nearly equal numbers
+        return np.asarray((2 * needed / (duration + spare)) ** 2)
 
 
 @dataclass(frozen=True)
@@ -226,41 +192,39 @@ class Swing:
     """Highest and lowest potential energies that motions have to reach, shape (P,) [J]."""
 
     arm: EnergyRange
+    displacement: Array
+    """Displacements, shape (P, nq) [rad]."""
     ends: Array
     """Potential energies of start and goal, shape (P, 2) [J]."""
     top: Array
     """Energy that every motion reaches at least, h."""
     bottom: Array
     """Energy that every motion reaches at most, l without the kinetic energy K_max."""
-    least: Array
-    """Lower bound on the potential energy of all configurations."""
 
     @classmethod
     def of(cls, arm: EnergyRange, q_start: Array, q_goal: Array, ends: Array) -> Swing:
         """The swing of motions from q_start to q_goal (P, nq) [rad]."""
         low, high = ends.min(axis=1), ends.max(axis=1)
         if arm.leading is None:
-            return cls(arm, ends, high, low, np.full(len(ends), -np.inf))
+            return cls(arm, q_goal - q_start, ends, high, low)
         wave, constant, beyond = arm.lumped
         crest, trough = _extremes(wave, q_start[:, arm.leading], q_goal[:, arm.leading])
-        least = np.full(len(ends), constant - float(np.hypot(*wave)) - beyond)
-        return cls(
-            arm,
-            ends,
-            np.maximum(high, constant + crest - beyond),
-            constant + trough + beyond,
-            least,
-        )
+        top = np.maximum(high, constant + crest - beyond)
+        return cls(arm, q_goal - q_start, ends, top, constant + trough + beyond)
 
-    def variation(self, duration: Array) -> Array:
-        """The right-hand side of (2), (P,) [J], for motions of at most given durations (P,) [s]."""
-        first, last = self.ends.T
-        low = self.ends.min(axis=1)
-        fast = 0.0 if self.arm.leading is None else self.arm.most_kinetic(duration)
-        bottom = np.minimum(low, self.bottom + fast)
-        span = self.top - bottom
+    def least_work(self, duration: Array) -> Array:
+        """Least work (P,) [J] by (2), or (3) in weightlessness, in at most durations (P,) [s]."""
+        return np.maximum(self._work(duration) - 4 * self.arm.rounding, 0.0)
+
+    def _work(self, duration: Array) -> Array:
+        if self.arm.leading is None:
+            return self.arm.work_of_travel(self.displacement, duration)
+        (first, last), low = self.ends.T, self.ends.min(axis=1)
+        bottom = np.minimum(low, self.bottom + self.arm.most_kinetic(duration))
         return np.asarray(
-            span + np.minimum(self.top - first + last - bottom, first - bottom + self.top - last)
+            self.top
+            - bottom
+            + np.minimum(self.top - first + last - bottom, first - bottom + self.top - last)
         )
 
 
@@ -282,13 +246,7 @@ def mechanical_bounds(
     longest = np.full(
         len(q_start), DURATIONS.longest if problem.duration_max is None else problem.duration_max
     )
-    swing = Swing.of(arm, q_start, q_goal, potentials)
-    travelled = 2 * _least_energy(
-        arm, q_goal - q_start, potentials, swing.least, longest
-    ) - potentials.sum(axis=1)
-    return np.asarray(
-        np.maximum(np.maximum(swing.variation(longest), travelled) - 4 * arm.rounding, 0.0)
-    )
+    return Swing.of(arm, q_start, q_goal, potentials).least_work(longest)
 
 
 def _extremes(wave: Array, one: Array, other: Array) -> tuple[Array, Array]:
@@ -308,35 +266,3 @@ def _extremes(wave: Array, one: Array, other: Array) -> tuple[Array, Array]:
 
     crest = np.where(holds(phase), size, ends.max(axis=0))
     return crest, np.where(holds(phase + np.pi), -size, ends.min(axis=0))
-
-
-def most_travel(potential: Array, fastest: Array, energy: Array, duration: Array | float) -> Array:
-    """The right-hand side of (3), shape (P,).
-
-    Args:
-        potential: least potential energies in the cells, by `EnergyRange.fall`.
-        fastest: A min(t, T - t) in the cells, by `EnergyRange.fall`.
-        energy: e, shape (P, 1) [J].
-        duration: durations [s].
-    """
-    speed = np.minimum(np.sqrt(2 * np.maximum(energy - potential, 0.0)), fastest)
-    return np.asarray(speed.sum(axis=1) * duration / MECHANICAL.cells)
-
-
-def _least_energy(
-    arm: EnergyRange, displacement: Array, potentials: Array, least: Array, duration: Array
-) -> Array:
-    """Least e (P,) [J] for which (3) holds, rounded down, at least the potential energies of the
-    ends.
-    """
-    needed = np.sqrt(displacement**2 @ arm.prepared.problem.arm.drives.rotor_inertia)
-    potential, fastest = arm.fall(potentials, least, duration)
-    low = potentials.max(axis=1)
-    # kinetic energy above the greatest bound of the potential energy at which the mean speed
-    # |Δq|_D / T is certainly reached
-    high = np.maximum(low, potential.max(axis=1)) + 2 * (needed / duration) ** 2
-    for _ in range(MECHANICAL.bisections):
-        middle = (low + high) / 2
-        enough = most_travel(potential, fastest, middle[:, None], duration) >= needed
-        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-    return np.asarray(low)

@@ -31,8 +31,6 @@ QUADRATURE = 1e-4
 EXACT = 1e-9
 # J; allowance of the bound for rounding and for axes not quite parallel to gravity
 GIVEN_AWAY = 1e-4
-# J/rad; central differences over 1e-5 rad
-DIFFERENCE = 1e-6
 
 CONDITIONS: dict[str, dict[str, Any]] = {
     "as it comes": {},
@@ -65,17 +63,14 @@ def bound(task: PreparedProblem, start: Array, goal: Array) -> Array:
 def test_what_the_proof_uses_holds(name: str) -> None:
     """The proof's assumptions agree with Pinocchio.
 
-    They concern the wave of the leading joint, the slopes of the potential, and the kinetic energy.
+    They concern the wave of the leading joint, and the kinetic energy.
     """
     task = prepared(1.0, **CONDITIONS[name])
     reach, model, rng = EnergyRange(task), task.model, np.random.default_rng(1)
     data, own = model.createData(), task.problem.arm.active_limits
     rotors = np.diag(task.problem.arm.drives.rotor_inertia)
     most = float(reach.most_kinetic(np.array([np.inf]))[0])
-    steps = 1e-5 * np.eye(6)
     for q in rng.uniform(-2 * np.pi, 2 * np.pi, (300, 6)):
-        slope = [(task.potential(q + step) - task.potential(q - step)) / 2e-5 for step in steps]
-        assert (np.abs(slope) <= reach.slopes + DIFFERENCE).all()
         v = own.v_max * rng.choice([-1.0, 1.0], 6)
         model.armature[:] = 0.0
         M = pin.crba(model, data, q)
@@ -139,7 +134,8 @@ def test_no_random_motion_does_less_work(name: str, count: int) -> None:
         )
         assert ours <= work * (1 + QUADRATURE) + EXACT
         stronger += ours > abs(task.potential(goal) - task.potential(start)) + EXACT
-    # the attack covers barrier and travel besides the climb; a tilted first joint lifts less than R
+    # besides the climb, the attack covers the barrier, or the travel in weightlessness; a tilted
+    # first joint lifts less than R
     assert stronger > 3 or EnergyRange(task).leading == 0
 
 
