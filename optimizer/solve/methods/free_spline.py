@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.plant import has_corners
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.motion.ruckig_motion import time_optimal
@@ -55,14 +54,6 @@ class FreeSplineSettings:
     seven are above, of which one needs 9 % less from a planned path; of the others, none needs 2 %
     less."""
 
-    ample_time: float = 1.0
-    """Time left with which a sole candidate is refined at once [s]."""
-
-    time_multiple: float = 30.0
-    """Time left after the coarse solve, as a multiple of its time, with which a sole candidate is
-    refined at once. With less, a checked motion comes first: refining takes twice as long, and up
-    to 8 solves."""
-
 
 FREE_SPLINE = FreeSplineSettings()
 
@@ -92,7 +83,9 @@ class FreeSpline(SplineMethod):
             count, least = SPLINE_SPACES.coarse_points, max(self.spaces.shortest, self.t_min)
             first = self.spaces.of_first_solve(count, least)
             for space in dict.fromkeys([first, bspline.uniform(count)]):
-                tried += self._from_smoothed(space)
+                points = self.spaces.smoothed_time_optimal(space)
+                guess = Guess(space, points, 0.0, coarse=True, progress=self._progress)
+                tried.append(self.improve(guess))
                 if not _is_lost(tried):
                     break
         if _is_lost(tried):
@@ -102,64 +95,6 @@ class FreeSpline(SplineMethod):
         elif self._may_be_on_the_wrong_side(tried[-1]):
             return self._compared_with_planned_paths(with_effort(tried[-1], tried))
         return with_effort(tried[-1], tried)
-
-    def _from_smoothed(self, space: Basis) -> list[SolveResult]:
-        """Attempts from the smoothed time-optimal motion in a space; the last one counts."""
-        points = self.spaces.smoothed_time_optimal(space)
-        guess = Guess(space, points, 0.0, coarse=True, progress=self._progress)
-        tried = list[SolveResult]()
-        if self._is_refined_at_once:
-            exact_below = FREE_SPLINE.exact_below * self.spaces.shortest
-            tried, guess = self._coarse_and_refined(guess, exact_below)
-        return tried if tried and tried[-1].spline is not None else [*tried, self.improve(guess)]
-
-    @property
-    def _is_refined_at_once(self) -> bool:
-        """Whether the coarse motion only serves as a guess of the refined one.
-
-        This needs a sole candidate without obstacles, fixed ends, and ample time.
-        """
-        problem = self.prepared.problem
-        context = self.context
-        settled = (
-            context.start_curve is None and context.goal_curve is None and not len(self.passes)
-        )
-        plain = (
-            not has_corners(problem.objective, problem.arm) and problem.arm.bus.mode != "storage"
-        )
-        return (
-            context.is_sole
-            and settled
-            and plain
-            and not problem.arm.scene.names
-            and self.deadline.left > FREE_SPLINE.ample_time
-        )
-
-    def _coarse_and_refined(
-        self, guess: Guess, exact_below: float
-    ) -> tuple[list[SolveResult], Guess]:
-        """Solve coarsely, checking for collisions alone, and refine the motion.
-
-        Args:
-            guess: the motion to start from.
-            exact_below: duration of the coarse motion below which the knots of the refinement have
-                exact multiplicity [s].
-
-        Returns:
-            The results, and a guess for the solve that follows if the last result has no motion:
-            there, the coarse motion is checked against all limits.
-        """
-        left = self.deadline.left
-        coarse = self.improve(replace(guess, unchecked=True))
-        if coarse.spline is None:
-            return [coarse], guess
-        points = self.coordinates.from_joints(coarse.spline.control_points)
-        duration = coarse.spline.duration
-        found = replace(guess, points=points, duration=duration, nearly_feasible=True)
-        late = self.deadline.left < FREE_SPLINE.time_multiple * (left - self.deadline.left)
-        if late or self.prepared.surroundings.worst_violation(coarse.spline) is not None:
-            return [replace(coarse, spline=None)], found
-        return [coarse, self.refined(coarse.spline, fine=duration < exact_below)], found
 
     def _may_be_on_the_wrong_side(self, found: SolveResult) -> bool:
         """Whether a motion may have left obstacles on the wrong side."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from itertools import count, product
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -22,8 +21,7 @@ from joulepath.optimizer.solve.methods import duration_intervals as duration_int
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
-from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
+from joulepath.optimizer.solve.methods.solve_result import SolveResult, SolveStatus
 from tests.optimizer.moves import (
     GOAL,
     PAYLOAD,
@@ -58,15 +56,13 @@ def solver(
     goal: Array,
     fastest: bool = False,
     wait: float = 60.0,
-    is_sole: bool = False,
-    deadline: Deadline | None = None,
     **given: Any,
 ) -> Method:
     compile_kernel(ROBOT)
     task = PreparedProblem.of(problem(start, goal, **given))
     interval = duration_intervals.fastest(task) if fastest else None
-    context = SolveContext.of(task, start, goal, deadline or Deadline.after(wait), interval)
-    return solver_for(replace(context, is_sole=is_sole))
+    context = SolveContext.of(task, start, goal, Deadline.after(wait), interval)
+    return solver_for(context)
 
 
 def spline(attempt: SolveResult) -> Spline:
@@ -155,61 +151,6 @@ def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches
         assert cost(spline(again)) <= cost(spline(fitted)) * (1 + 1e-3)
         assert_held(problem(start, goal), spline(again))
     assert steps[0] < steps[1]
-
-
-def test_a_sole_candidate_is_refined_at_once() -> None:
-    """A sole candidate's coarse motion is only a guess; the result equals two separate solves."""
-    at_once, twice = solver(START, GOAL, is_sole=True), solver(START, GOAL)
-    found = spline(at_once.solve())
-    coarse = spline(twice.solve())
-    assert FreeSpline.may_refine(coarse) and not FreeSpline.may_refine(found)
-    assert_held(at_once.prepared.problem, found)
-    tight = coarse.duration < SPLINE_SPACES.tight * shortest_duration(GOAL - START, ROBOT.limits)
-    cost = at_once.prepared.cost_of
-    assert cost(found) == pytest.approx(
-        cost(spline(twice.refined(coarse, fine=bool(tight)))), rel=1e-3
-    )
-
-
-@pytest.mark.parametrize("why", ["refining fails", "another candidate", "little time"])
-def test_else_the_coarse_motion_is_checked(why: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    wait, is_sole = 0.8 if why == "little time" else 60.0, why != "another candidate"
-    own = solver(START, GOAL, wait=wait, is_sole=is_sole)
-    if why == "refining fails":
-        failed = SolveResult(SolveStatus.FAILED, SolveReason.MOTION_COLLIDES, 5, 1)
-        monkeypatch.setattr(FreeSpline, "refined", lambda *_, **__: failed)
-    result = own.solve()
-    assert FreeSpline.may_refine(spline(result))
-    assert result.solves == (3 if why == "refining fails" else 1)
-    assert_held(own.prepared.problem, spline(result))
-
-
-@pytest.mark.parametrize(
-    ("readings", "refined"), [(25, False), (30, False), (34, False), (200, False), (1000, True)]
-)
-def test_on_a_slow_machine_a_checked_motion_comes_first(readings: int, refined: bool) -> None:
-    """On a slow machine, the first result is a checked coarse motion without refinement.
-
-    Every reading of the clock takes a share of the time; both solves take 34 readings.
-    """
-    ticks = count()
-    deadline = Deadline(2.0, clock=lambda: 2.0 * next(ticks) / readings)
-    own = solver(START, GOAL, is_sole=True, deadline=deadline)
-    found = spline(own.solve())
-    assert FreeSpline.may_refine(found) is not refined
-    assert_held(own.prepared.problem, found)
-
-
-def test_a_coarse_motion_that_collides_is_no_guess() -> None:
-    """A colliding coarse motion is solved again with clearance constraints, not refined."""
-    start, goal = list(random_moves(5, 7))[6]
-    own, usual = (
-        solver(start, goal, collisions=True, is_sole=is_sole) for is_sole in (True, False)
-    )
-    found, expected = own.solve(), usual.solve()
-    assert expected.unobstructed_cost is not None
-    assert found.unobstructed_cost == pytest.approx(expected.unobstructed_cost)
-    assert FreeSpline.may_refine(spline(found))
 
 
 def slowly(speed: float, **given: object) -> FreeSpline:
