@@ -12,15 +12,13 @@ from typing import ClassVar
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.motion import bspline
-from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.motion.ruckig_motion import time_optimal
-from joulepath.optimizer.motion.spline import Spline, spline_of
+from joulepath.optimizer.motion.spline import spline_of
 from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.result.baseline import BaselineName
 from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.method import above
 from joulepath.optimizer.solve.methods.solve_result import (
-    MotionOrigin,
     SolveResult,
     SolveStatus,
     with_effort,
@@ -43,10 +41,6 @@ class FreeSplineSettings:
     allowed_penetration: float = 0.02
     """Penetration of a spline fitted to a planned path beyond which more control points are
     taken [m]."""
-
-    polish_below: float = 1.05
-    """Multiple of the incumbent's cost up to which a motion from a planned path with more control
-    points is solved to the end: this gains a few percent at most."""
 
     detour_cost: float = 1.12
     """Ratio to the cost without obstacles above which a motion that left obstacles is compared with
@@ -112,37 +106,6 @@ class FreeSpline(SplineMethod):
             return replace(found, cut_short=late)
         better = planned.spline is not None and self.cost_of(planned.spline) < energy
         return with_effort(planned if better else replace(found, cut_short=late), [found, planned])
-
-    def from_planned_paths(self, failed: SolveResult) -> SolveResult:
-        """Solve from planned paths, and solve the motion of least cost to the end.
-
-        Args:
-            failed: result without planned paths.
-
-        Returns:
-            The result of least cost; `failed` if no path leads to a motion.
-        """
-        known = self.incumbent_cost
-        best = super().from_planned_paths(failed)
-        if (
-            best.spline is None
-            or self.may_refine(best.spline)
-            or self.cost_of(best.spline) > above(known, FREE_SPLINE.polish_below)
-        ):
-            return best
-        polished = self._polished(best.spline)
-        if polished.spline is None or self.cost_of(polished.spline) >= self.cost_of(best.spline):
-            return with_effort(best, [best, polished])
-        polished = replace(polished, origin=MotionOrigin.FROM_PLANNED_PATH)
-        return with_effort(polished, [best, polished])
-
-    def _polished(self, spline: Spline) -> SolveResult:
-        """Finish a coarse solve with more control points than `may_refine` accepts."""
-        space = Basis.of(spline.knots / spline.duration)
-        points = self.coordinates.from_joints(spline.control_points)
-        return self.improve(
-            Guess(space, points, spline.duration, collision_free=True, progress=self._progress)
-        )
 
     def along_path(self, q: Array, t: Array) -> SolveResult:
         """Solve from samples q (k, nq) [rad] of a collision-free path at times t (k,) in [0, 1].

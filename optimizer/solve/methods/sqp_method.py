@@ -56,10 +56,6 @@ class SqpMethodSettings:
     """The same on an isolated bus: smoothed corners cost a few percent, as much as following the
     motion to sharp corners saves."""
 
-    planned_path_margin: float = 2.5
-    """Multiple of the incumbent's cost above which a planned path is not optimised: the cost seldom
-    falls by so much."""
-
     deep_penetration: float = 0.06
     """Penetration of the motion without clearance constraints beyond which, once a motion is known,
     only planned paths are optimised [m]. So deep inside an obstacle, the SQP seldom finds a way
@@ -96,8 +92,6 @@ class SqpMethod(StagedMethod):
 
     def _improved(self, guess: Guess, deadline: Deadline) -> SolveResult:
         stage = self.first_stage(guess)
-        if self._is_far_costlier(guess, stage):
-            return SolveResult(SolveStatus.PRUNED, SolveReason.PROMISES_NO_LESS)
         iterations, collision, unobstructed_cost = 0, None, None
         for solves in range(1, SQP_METHOD.repairs + 1):
             result, needed = self._solved(guess, stage, deadline)
@@ -184,19 +178,6 @@ class SqpMethod(StagedMethod):
         if self.context.start_curve is not None or self.context.goal_curve is not None:
             return above(self.incumbent_cost, SQP_METHOD.sliding_margin)
         return self.incumbent_cost
-
-    def _is_far_costlier(self, guess: Guess, stage: Stage) -> bool:
-        """Whether a planned path costs too much to come below the incumbent."""
-        # where energy is regenerated, the net energy may fall to any fraction
-        returned = self.prepared.arm.bus.mode in ("recuperating", "storage")
-        if (
-            returned
-            or not (guess.coarse and len(stage.pairs))
-            or np.isinf(self._must_be_below(stage))
-        ):
-            return False
-        cost, _ = stage.program.value(stage.free, stage.duration)
-        return cost > above(self.incumbent_cost, SQP_METHOD.planned_path_margin)
 
     def from_planned_paths(self, failed: SolveResult) -> SolveResult:
         """Solve from planned paths as initial guesses.
