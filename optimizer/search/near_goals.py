@@ -94,13 +94,13 @@ def activate_near_goals(prepared: PreparedProblem, candidates: list[Candidate]) 
     pool = [*_moved(prepared, samples), *samples]
     is_work = prepared.problem.objective == "mechanical"
     if is_work:
-        chosen = _local_minima(pool, estimates(prepared, pool), NEAR_GOALS.mechanical)
+        chosen = _separate_minima(pool, estimates(prepared, pool), NEAR_GOALS.mechanical)
     else:
         energy = expected(prepared, pool)
         turned = other_turns(prepared, samples, float(energy.min()))
         if turned:
             pool, energy = [*pool, *turned], np.concatenate([energy, expected(prepared, turned)])
-        chosen = _local_minima(pool, energy, NEAR_GOALS.electrical)
+        chosen = _separate_minima(pool, energy, NEAR_GOALS.electrical)
     for each in chosen:
         if each.deferred:
             each.activate()
@@ -152,7 +152,7 @@ def _moved(prepared: PreparedProblem, samples: Sequence[Candidate]) -> list[Cand
     return moved
 
 
-def _local_minima(
+def _separate_minima(
     pool: Sequence[Candidate], energy: Array, settings: ChoiceSettings
 ) -> list[Candidate]:
     """Candidates of locally least energy.
