@@ -118,15 +118,15 @@ def test_a_programmer_makes_a_round_of_a_table(browser: Browser, service: Server
         )
         page.locator("#readings").get_by_role("button", name=RADIANS, exact=True).click()
         names = "() => studio.state.request.stops.map(({ name }) => name).join()"
-        assert page.evaluate(names) == "pick 1,place 1,rest 1"
+        assert page.evaluate(names) == "pick,place,rest"
         rest = page.locator("[data-row='/stops/2/target']")
-        rest.get_by_label("rest 1 X in mm").press("Alt+ArrowUp")
-        assert page.evaluate(names) == "pick 1,rest 1,place 1"
-        page.locator("[data-row='/stops/1/target']").get_by_label("More for rest 1").click()
+        rest.get_by_label("rest X in mm").press("Alt+ArrowUp")
+        assert page.evaluate(names) == "pick,rest,place"
+        page.locator("[data-row='/stops/1/target']").get_by_label("More for rest").click()
         page.get_by_role("button", name="Delete", exact=True).click()
-        assert page.evaluate(names) == "pick 1,place 1"
+        assert page.evaluate(names) == "pick,place"
         page.keyboard.press("Control+z")
-        assert page.evaluate(names) == "pick 1,rest 1,place 1"
+        assert page.evaluate(names) == "pick,rest,place"
         page.keyboard.press("Control+Shift+z")
         page.locator("[data-row='/stops/0/target'] input").nth(1).focus()
         page.get_by_role("radio", name="takes").click()
@@ -163,7 +163,7 @@ def test_a_programmer_makes_a_round_of_a_table(browser: Browser, service: Server
         program = Path(download.value.path()).read_text()
         assert program.count("movej([") == 4, "start, two stops, and back"
         assert "set_target_payload(2," in program
-        put_down = program.index("# place 1"), program.index("# start", program.index("# place 1"))
+        put_down = program.index("# place"), program.index("# start", program.index("# place"))
         for line in ("set_standard_digital_out(0, False)", "set_target_payload(0,"):
             assert put_down[0] < program.index(line, put_down[0]) < put_down[1]
 
