@@ -142,7 +142,8 @@ def json_document(content: Any) -> bytes:
     return orjson.dumps(
         content,
         default=as_json,
-        option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_PASSTHROUGH_DATACLASS,
+        # times end in Z, as pydantic writes them
+        option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_PASSTHROUGH_DATACLASS | orjson.OPT_UTC_Z,
     )
 
 

@@ -82,7 +82,7 @@ def as_csv(history: History) -> bytes:
     rows: list[Iterable[Any]] = [_COLUMNS.values()]
     for entry in entries(history):
         row = entry | {
-            "created": entry["created"].isoformat(),
+            "created": entry["created"].isoformat().replace("+00:00", "Z"),
             "threshold_met": "true" if entry["threshold_met"] else "false",
         }
         rows.append([row[name] for name in _COLUMNS])

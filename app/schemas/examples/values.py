@@ -90,6 +90,6 @@ ITERATION_EXAMPLES |= {
 STUDY_CSV = (
     "iteration,created,kind,energy_J,electrical_J,mechanical_J,duration_s,change_from_last_J,"
     "change_from_best_J,threshold_met,answer\n"
-    f"1,2025-03-14T09:26:53.589793+00:00,optimize,96.1,96.1,31.9,1.33,,,false,{ANSWER_ID}\n"
+    f"1,2025-03-14T09:26:53.589793Z,optimize,96.1,96.1,31.9,1.33,,,false,{ANSWER_ID}\n"
 )
 """The history of a study as CSV."""

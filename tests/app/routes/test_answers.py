@@ -122,6 +122,7 @@ def test_the_answers_are_listed(recorded: TestClient) -> None:
         each["created"] for each in found
     ]
     by_id = {each["id"]: each for each in found}
+    assert recorded.get(own["answer"]).json()["created"] == by_id[own["id"]]["created"]
     figures = [by_id[own["answer"].removeprefix("/answers/")], by_id[step["answer"]]]
     energies = [own["energy"]["electrical"]["total"], step["energy"]]
     assert [each["energy"] for each in figures] == energies

@@ -147,6 +147,7 @@ def test_the_history_as_a_table(client: TestClient, three: Any) -> None:
         entry["number"] for entry in study["history"]
     ]
     for row, entry in zip(rows, study["history"], strict=True):
+        assert row["created"] == entry["created"]
         assert float(row["energy_J"]) == entry["energy"]
         assert float(row["duration_s"]) == entry["duration"]
         assert (float(row["change_from_last_J"]) if row["change_from_last_J"] else None) == entry[
