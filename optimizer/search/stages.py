@@ -26,6 +26,7 @@ from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.other_ways import explore_other_ways
 from joulepath.optimizer.search.path_ends import path_candidates
 from joulepath.optimizer.search.refinement import refine, refine_rivals
+from joulepath.optimizer.search.resting_posture import rest_on_the_way
 from joulepath.optimizer.search.sampled_ends import between
 from joulepath.optimizer.search.state import FoundMotion, SearchState
 from joulepath.optimizer.search.tightened_limits import retry_within_tighter_limits
@@ -102,6 +103,7 @@ def refine_best(state: SearchState) -> None:
         return
     best = start_beside(state, best)
     coarse = best.energy or 0.0
+    rest_on_the_way(state, best)
     refine(state, best)
     refine_rivals(state, best, coarse)
     start_from_free_duration(state, state.best() or best)

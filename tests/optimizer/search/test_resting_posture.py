@@ -1,0 +1,53 @@
+"""Motions with much time rest where the motors hold the arm at little power."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from joulepath.optimizer.evaluate.evaluate import evaluate
+from joulepath.optimizer.evaluate.recording import Waypoints
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.dwell import Dwell
+from joulepath.optimizer.problem.problem import Problem
+from tests.optimizer.moves import ROBOT
+
+ARM = Arm(robot=ROBOT, payload=Payload(mass=5.0), collisions=False)
+WAY = 2.0
+"""Duration of a way by hand [s]."""
+
+
+@pytest.mark.parametrize(
+    ("start", "rest", "goal", "time", "given"),
+    [
+        pytest.param(
+            [0.0, 0.0, 0.3, 0.0, 0.0, 0.0],
+            [0.0, -1.6, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.3, 0.0, 0.0, 0.0],
+            8.0,
+            {"dwell": Dwell(8.0)},
+            id="no slope leads away from waiting between equal ends",
+        ),
+        pytest.param(
+            [0.1, 0.6, -0.2, -1.8, 0.2, -1.9],
+            [0.1, 1.6, -0.1, -1.6, -0.1, -1.9],
+            [0.4, 0.2, -0.3, -2.0, -0.1, -1.9],
+            15.0,
+            {"duration_min": 15.0, "duration_max": 15.0},
+            id="the slope leads upwards and the better rest is hanging",
+            marks=pytest.mark.long,
+        ),
+    ],
+)
+def test_it_needs_less_than_a_rest_by_hand(
+    start: list[float], rest: list[float], goal: list[float], time: float, given: dict[str, Any]
+) -> None:
+    by_hand = Waypoints(np.array([start, rest, rest, goal]), [WAY, time - 2 * WAY, WAY], "quintic")
+    evaluated = evaluate(ARM, by_hand, progress=False)
+    assert all(report.held for report in evaluated.limits)
+    problem = Problem(arm=ARM, start=start, goal=goal, windings=False, **given)
+    found = optimize(problem).energy.electrical.total
+    assert found < evaluated.total.energy.electrical.total
