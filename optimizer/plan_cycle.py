@@ -24,7 +24,12 @@ from joulepath.optimizer.cycle.cycle_solution import (
 )
 from joulepath.optimizer.cycle.divided_paths import with_divided_paths
 from joulepath.optimizer.cycle.equal_times import in_equal_times
-from joulepath.optimizer.cycle.feasible_cycles import FeasibleCycle, allocated_cycle, simple_cycles
+from joulepath.optimizer.cycle.feasible_cycles import (
+    FeasibleCycle,
+    allocated_cycle,
+    simple_cycles,
+    waitless_cycle,
+)
 from joulepath.optimizer.cycle.free_orientations import with_free_orientations
 from joulepath.optimizer.cycle.move_problem import MOVE
 from joulepath.optimizer.cycle.moves import moves_of
@@ -275,11 +280,12 @@ def _in_time(search: CycleSearch, duration: float, chains: Sequence[list[int]]) 
         duration: duration of the cycle [s].
         chains: chains with known motions, to start from the first one.
     """
-    timing, timed, best = TimedSearch(search, duration), None, None
+    timing, timed, best, waitless = TimedSearch(search, duration), None, None, None
     failure: JoulepathError = NoTrajectory([])
     try:
         timed = timing.run(chains[0] if chains else None)
         best = allocated_cycle(timing, timed)
+        waitless = waitless_cycle(timing, timed)
     except (NoTrajectory, DeadlineExceeded) as error:
         failure = error
     chains = [*chains, *([timed.nodes] if timed is not None and timed.nodes not in chains else [])]
@@ -288,7 +294,8 @@ def _in_time(search: CycleSearch, duration: float, chains: Sequence[list[int]]) 
         chains,
         best is None or (search.cycle.with_baselines and not search.cycle.has_passes),
     )
-    found = least_certified([*([] if best is None else [best]), *simple])
+    allocated = [each for each in (best, waitless) if each is not None]
+    found = least_certified([*allocated, *simple])
     if found is None:
         raise failure
     bound = proven_bound(search.cycle, search.legs, search.end)

@@ -26,6 +26,7 @@ from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.dynamics.interval import MotionEnergy
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline, lasting, retimed
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.state import ENERGY_TOLERANCE
 
@@ -187,12 +188,7 @@ def allocated_cycle(timing: TimedSearch, timed: TimedChain) -> FeasibleCycle:
     Raises:
         JoulepathError: the errors of `optimize`.
     """
-    lengths, solutions = timed.allocation.durations, list[Solution]()
-    for pair, length in zip(timing.search.pairs(timed.nodes), lengths, strict=True):
-        own = timing.search.solutions.get(pair)
-        solutions.append(
-            own if own is not None and own.duration == length else _solved_in(timing, pair, length)
-        )
+    solutions = _solutions(timing, timed.nodes, timed.allocation.durations)
     motions = [each.trajectory.spline for each in solutions]
     return FeasibleCycle(
         timing,
@@ -204,6 +200,42 @@ def allocated_cycle(timing: TimedSearch, timed: TimedChain) -> FeasibleCycle:
         None,
         solutions,
     )
+
+
+def waitless_cycle(timing: TimedSearch, timed: TimedChain) -> FeasibleCycle | None:
+    """The cycle of a timed chain with its wait shared out among the moves, for mechanical work.
+
+    Motions at a price of time are too short: their smoothed |tau v| is positive at rest, but rest
+    does no work. Longer motions may do less.
+
+    Returns:
+        The cycle; None without a wait, for electrical energy, or if a motion is not found in time.
+    """
+    allocation = timed.allocation
+    if timing.cycle.objective != "mechanical" or not allocation.waited:
+        return None
+    factor = min(
+        1 + allocation.waited / allocation.moving_time,
+        DURATIONS.longest / max(allocation.durations),
+    )
+    try:
+        solutions = _solutions(timing, timed.nodes, [factor * T for T in allocation.durations])
+    except (NoTrajectory, DeadlineExceeded):
+        return None
+    motions = [each.trajectory.spline for each in solutions]
+    return FeasibleCycle.of(timing, timed.nodes, motions, solutions=solutions)
+
+
+def _solutions(timing: TimedSearch, nodes: list[int], lengths: Sequence[float]) -> list[Solution]:
+    """Certified motions of a chain in given durations [s]; raises the errors of `optimize`."""
+    pairs = zip(timing.search.pairs(nodes), lengths, strict=True)
+    own = timing.search.solutions
+    return [
+        own[pair]
+        if pair in own and own[pair].duration == length
+        else _solved_in(timing, pair, length)
+        for pair, length in pairs
+    ]
 
 
 def _solved_in(timing: TimedSearch, pair: Pair, length: float) -> Solution:

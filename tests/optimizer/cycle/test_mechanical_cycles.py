@@ -9,7 +9,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from joulepath import CycleSolution, CycleTooShort, Problem, plan_cycle
+from joulepath import CycleSolution, CycleTooShort, Problem, Stop, optimize, plan_cycle
 from joulepath.optimizer.bounds.mechanical_bound import mechanical_bounds
 from joulepath.optimizer.bounds.priced_work import PRICED_WORK, priced_work_bounds
 from joulepath.optimizer.cycle.stop_layers import layers_of
@@ -63,6 +63,32 @@ def test_the_cycle_is_true(time: float, method: MethodName) -> None:
         assert each.saving == pytest.approx(1 - work / each.mechanical)
         if each.duration == pytest.approx(time):
             assert each.saving >= -CONVERGED
+
+
+def test_a_single_move_uses_all_of_the_time() -> None:
+    """It does no more work than the same motion by itself."""
+    goal = HOME + np.array([1.0, 0.3, 0.0, 0.0, 0.0, 0.0])
+    asked = replace(
+        ASKED,
+        stops=[Stop(name="goal", target=goal)],
+        closed=False,
+        duration_max=4.0,
+        method="time_scaling",
+        with_baselines=False,
+    )
+    alone = optimize(
+        Problem(
+            arm=ASKED.arm,
+            start=HOME,
+            goal=goal,
+            windings=False,
+            objective="mechanical",
+            duration_max=4.0,
+            method="time_scaling",
+        )
+    )
+    work = alone.energy.mechanical.total
+    assert plan_cycle(asked).energy.mechanical.total <= work * (1 + CONVERGED)
 
 
 def test_no_random_cycle_gets_below_the_bound() -> None:

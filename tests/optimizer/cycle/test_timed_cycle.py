@@ -302,3 +302,19 @@ def test_time_that_cannot_be_shared_leaves_simpler_cycles(
         assert found.energy.electrical.total == pytest.approx(taken.electrical, rel=ROUNDING)
         # evenly slowed moves need less energy than fast moves with a wait
         assert (sum(move.wait for move in found.moves) > 0) == (factor == SHORTER)
+
+
+def test_the_effort_on_bounds_does_not_change_the_cycle() -> None:
+    asked = replace(
+        ASKED,
+        stops=[Stop(name="goal", target=HOME + TURN)],
+        closed=False,
+        duration_max=1.5,
+        duration_min=1.5,
+        method="time_scaling",
+        with_baselines=False,
+    )
+    rounds = [plan_cycle(replace(asked, bound=bound)) for bound in ("plain", "normal")]
+    first, second = (each.moves[0].solution.trajectory.spline for each in rounds)
+    assert rounds[0].duration == pytest.approx(1.5) and first == second
+    assert rounds[0].lower_bound == rounds[1].lower_bound
