@@ -102,8 +102,8 @@ def refine_best(state: SearchState) -> None:
     if best is None or best.refused:
         return
     best = start_beside(state, best)
-    coarse = best.energy or 0.0
     rest_on_the_way(state, best)
+    coarse = best.energy or 0.0
     refine(state, best)
     refine_rivals(state, best, coarse)
     start_from_free_duration(state, state.best() or best)
