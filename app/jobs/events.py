@@ -78,6 +78,12 @@ async def events_after(
         changes.leave(job_id, bell)
 
 
+async def ended_by(store: Store, job_id: str, number: int) -> bool:
+    """Whether a job has ended and no event follows `number`."""
+    batch = await store.read(partial(_batch, job_id=job_id, number=number))
+    return batch.over and not batch.count
+
+
 def _batch(session: Session, job_id: str, number: int) -> _Batch:
     found, over = job_events.after(session, job_id, number, EVENTS.batch)
     texts = [

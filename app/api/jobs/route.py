@@ -39,7 +39,7 @@ from joulepath.app.http.json_route import UNDECLARED, JsonRoute, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import JSON
 from joulepath.app.jobs.answers import as_csv, as_lines, detail, summary
-from joulepath.app.jobs.events import events_after
+from joulepath.app.jobs.events import ended_by, events_after
 from joulepath.app.schemas.examples.values import JOB_ID, RESULTS_CSV, RESULTS_LINES
 from joulepath.app.schemas.jobs import Job, JobDetail, JobList, JobPage, NewJob, RequestPage
 from joulepath.app.schemas.queries import NewName
@@ -211,6 +211,7 @@ KnownJob = Annotated[str, Depends(_known)]
     response_class=StreamingResponse,
     responses={
         200: {"content": {EVENT_STREAM: {"itemSchema": EVENT_SCHEMA}}},
+        204: {"description": "The job has ended, and no event follows `Last-Event-ID`."},
         **problem_responses(*_OF_ONE),
     },
 )
@@ -222,6 +223,9 @@ async def events(
     after a given number, also after a restart of the service. The stream closes when the job has
     ended."""
     number = int(last) if last is not None and last.isdecimal() and len(last) < 10 else 0
+    # the status at which an EventSource of a browser does not connect again
+    if number and await ended_by(store, job_id, number):
+        return Response(status_code=204)
     # in batches, and not event by event as FastAPI has it: hundreds may follow one job
     found = events_after(store, jobs.dispatcher, job_id, number)
     return StreamingResponse(found, headers=EVENT_STREAM_HEADERS, media_type=EVENT_STREAM)
