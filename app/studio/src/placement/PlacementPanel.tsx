@@ -70,13 +70,14 @@ function Found() {
           <dd>{answer.lower_bound === null ? "no bound" : `${figure(answer.lower_bound)} J`}</dd>
         </div>
         <div>
-          <dt>places computed</dt>
+          <dt>places computed, on the map and beside it</dt>
           <dd>{answer.evaluated}</dd>
         </div>
       </dl>
       {answer.left_out > 0 && (
         <p class="warning-text">
-          {answer.left_out} of {map.places.length} places were left out at the deadline.
+          {answer.left_out} of the {map.places.length} places of the map were left out at the
+          deadline.
         </p>
       )}
       {answer.warnings.map((text) => (
