@@ -182,6 +182,9 @@ class EnergyRange:
         rotors = self.prepared.problem.arm.drives.rotor_inertia
         needed = np.sqrt(displacement**2 @ rotors)
         most = float(np.sqrt(self.prepared.problem.arm.active_limits.a_max**2 @ rotors))
+        if most == 0:
+            # without rotor inertia, (3) says nothing
+            return np.zeros(len(displacement))
         spare = np.sqrt(np.maximum(duration**2 - 4 * needed / most, 0.0))
         # the root A / 2 (T - spare) without a difference of nearly equal numbers
         return np.asarray((2 * needed / (duration + spare)) ** 2)

@@ -208,6 +208,15 @@ def test_weightless_travel() -> None:
     assert 0.85 * rotor * v**2 < ours <= rotor * v**2
 
 
+def test_weightless_travel_without_rotors_has_no_bound() -> None:
+    """Nor does it have one of 0 / 0."""
+    asked = prepared(2.0, gravity=[0, 0, 0]).problem
+    robot = asked.arm.robot
+    robot = replace(robot, drives=replace(robot.drives, rotor_inertia=np.zeros(6)))
+    task = PreparedProblem.of(replace(asked, arm=replace(asked.arm, robot=robot)))
+    assert bound(task, np.zeros((1, 6)), np.ones((1, 6))).tolist() == [0.0]
+
+
 def test_a_longer_duration_never_raises_the_bound() -> None:
     rng = np.random.default_rng(4)
     start, goal = rng.uniform(-3.0, 3.0, (2, 200, 6))
