@@ -12,6 +12,8 @@ const SHAPES = [
   { value: "arc", text: "Arc" },
 ] as const;
 
+const RAMP = 0.02; // default length of the ramps of a held speed [m]
+
 /** How the TCP goes along the path. */
 export function PathFields() {
   const shape = String(
@@ -88,6 +90,18 @@ function Speed() {
           />
           <span>held all along, as for glue</span>
         </label>
+      )}
+      {held && (
+        <div class="field">
+          <span>reached, and left again, within</span>
+          <NumberCell
+            label="Ramp"
+            pointer="/path/speed/ramp"
+            value={at(given, "/ramp") ?? RAMP}
+            unit="mm"
+            withUnit
+          />
+        </div>
       )}
     </>
   );
