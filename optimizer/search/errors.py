@@ -63,7 +63,7 @@ class InCollision(JoulepathError):
         first, second = self.pair
         return (
             f"The {self.target} is in collision {each}with a missing clearance of at least "
-            f"{self.depth:.4f} m "
+            f"{math.ceil(self.depth * 1e4) / 1e4:.4f} m "  # never less than what is missing
             f"({first} and {second}): move the {self.target} or the obstacle."
         )
 
