@@ -55,6 +55,8 @@ export function Baselines() {
       {kept.some(({ duration }) => differ(duration, shown.solution.duration)) && (
         <p class="hint">
           Compared in the longer of both times: whatever ends first waits until then, motors on.
+          {kept.some(({ saving }) => saving !== null && saving <= -EQUAL) &&
+            " Where a slower way needs less, ask for exactly its time: the motion is then optimised for it."}
         </p>
       )}
       {!kept.length && (
