@@ -36,7 +36,16 @@ FINISHING = FinishingSettings()
 
 
 def finishing_time(problem: Problem, duration: float, candidates: int) -> float:
-    """Time before a problem's deadline at which its search ends [s].
+    """Time before a problem's deadline at which its search ends [s]: `time_to_finish`, but for
+    `most_share` of the deadline at most.
+    """
+    return min(
+        time_to_finish(problem, duration, candidates), FINISHING.most_share * problem.deadline
+    )
+
+
+def time_to_finish(problem: Problem, duration: float, candidates: int) -> float:
+    """Time to certify and report an answer [s].
 
     Args:
         problem: the problem.
@@ -50,8 +59,7 @@ def finishing_time(problem: Problem, duration: float, candidates: int) -> float:
     per_instant = FINISHING.per_instant + FINISHING.per_constrained_instant * constrained
     certificate = duration / QUADRATURE.grid_period * per_instant
     least = min(FINISHING.least_share * problem.deadline, FINISHING.least)
-    needed = least + certificate + _report_time(problem, duration, candidates)
-    return min(needed, FINISHING.most_share * problem.deadline)
+    return least + certificate + _report_time(problem, duration, candidates)
 
 
 def report_time(problem: Problem, answer: Solution) -> float:

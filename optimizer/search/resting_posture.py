@@ -1,9 +1,9 @@
-"""Rests of little power on the way, as starts for motions with much time.
+"""Motions with a rest in a posture of little holding power, as initial guesses.
 
-If a motion may last far longer than its joints need, it may go to a posture that the motors hold at
-little power, rest there, and go on to the goal. The first solve starts from the straight line, and
-follows the slope of the holding power: it ends in the nearest valley. Between equal ends the
-shortest motion of a dwell even has no slope that leads away from it.
+If a motion may last much longer than its joints need, it can go to a posture that the motors hold
+with little power, rest there, and go on to the goal. The first solve starts from the straight line
+and ends in a local minimum near it. With equal start and goal, the gradient is even zero for a
+motion that stays at the start.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.motion import bspline, quintic
 from joulepath.optimizer.motion.bspline import Basis
-from joulepath.optimizer.motion.quadrature import quadrature
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.search.attempts import improve
 from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.finishing_time import time_to_finish
+from joulepath.optimizer.search.seeds import of_quintics
 from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.solve_result import SolveResult
@@ -49,10 +50,6 @@ class RestSettings:
     """Duration of a way, in multiples of the shortest duration of a quintic."""
     way_points: int = 9
     """Control points of a way in the guess."""
-    panels: int = 4
-    """Panels of the quadrature over a way."""
-    points: int = 3
-    """Points of the quadrature in a panel."""
     seed: int = 0
     """Seed of the random postures."""
 
@@ -78,6 +75,12 @@ def rest_on_the_way(state: SearchState, candidate: Candidate) -> None:
         return
     time = candidate.spline.duration if problem.dwell is None else problem.duration_max
     assert time is not None and candidate.energy is not None
+    if time > candidate.spline.duration:
+        # a longer motion takes longer to certify, and replaces one that is ready in time
+        needed = time_to_finish(problem, time, len(state.candidates))
+        if state.end.left < needed:
+            state.cut_short = True
+            return
     rests = _Rests(state.prepared, candidate.q_start, candidate.q_goal, time)
     posture = rests.below(candidate.energy)
     if posture is not None:
@@ -98,19 +101,19 @@ class _Rests:
     q_goal: Array
     time: float
 
-    def below(self, energy: float, settings: RestSettings = REST) -> Array | None:
+    def below(self, energy: float) -> Array | None:
         """The posture (nq,) [rad] whose motion needs least; None if none needs less than an energy
         [J].
         """
         limits, base = self.prepared.arm.active_limits, self.prepared.arm.base_power
-        most = (1 - settings.least_saving) * energy
+        most = (1 - REST.least_saving) * energy
         direct = self._ways(self.q_goal[None]).max()
-        if self.time < settings.least_ratio * direct or base * self.time > most:
+        if self.time < REST.least_ratio * direct or base * self.time > most:
             return None
-        rng = np.random.default_rng(settings.seed)
-        shape = settings.sampled, limits.q_min.size
+        rng = np.random.default_rng(REST.seed)
+        shape = REST.sampled, limits.q_min.size
         between = self.q_start + rng.random((shape[0], 1)) * (self.q_goal - self.q_start)
-        low, high = np.log(settings.spreads)
+        low, high = np.log(REST.spreads)
         spread = np.exp(rng.uniform(low, high, (shape[0], 1)))
         q = np.clip(between + spread * rng.normal(size=shape), limits.q_min, limits.q_max)
         q = q[self._ways(q).sum(axis=0) < self.time]
@@ -118,13 +121,13 @@ class _Rests:
         least = base * moving + self.prepared.holding_power(q) * (self.time - moving)
         if least.min(initial=np.inf) > most:
             return None
-        q = q[np.argsort(least)[: settings.estimated]]
+        q = q[np.argsort(least)[: REST.estimated]]
         best, posture = np.inf, q[0]
-        for k in range(settings.rounds + 1):
+        for k in range(REST.rounds + 1):
             estimated = self._energies(q)
             if estimated.min() < best:
                 best, posture = float(estimated.min()), q[estimated.argmin()]
-            step = settings.step / 2**k * rng.normal(size=(settings.estimated, shape[1]))
+            step = REST.step / 2**k * rng.normal(size=(REST.estimated, shape[1]))
             step *= rng.random(step.shape) < 0.5
             q = np.clip(posture + step, limits.q_min, limits.q_max)
         return posture if best < energy else None
@@ -144,25 +147,11 @@ class _Rests:
         ways = self._ways(q)
         energy = self.prepared.holding_power(q) * (self.time - ways.sum(axis=0))
         energy[ways.sum(axis=0) > self.time] = np.inf
-        for begin, end, T in ((self.q_start, q, ways[0]), (q, self.q_goal, ways[1])):
-            energy += self._way(begin, end, T)
+        start, goal = np.broadcast_to(self.q_start, q.shape), np.broadcast_to(self.q_goal, q.shape)
+        for begin, end, T in ((start, q, ways[0]), (q, goal, ways[1])):
+            moving, torque_ratio = of_quintics(self.prepared, begin, end, T)
+            energy += np.where(torque_ratio > 1, np.inf, moving)
         return np.asarray(energy)
-
-    def _way(self, begin: Array, end: Array, T: Array) -> Array:
-        """Energies (k,) [J] of quintics from begin to end in T (k,) [s]."""
-        panels = np.linspace(0.0, 1.0, REST.panels + 1)
-        x, weights = quadrature(panels, REST.points)
-        at, rate, acceleration = quintic.derivatives(x)[:, :, None]
-        begin, end = np.broadcast_arrays(begin, end)
-        displacement, T = (end - begin)[:, None], T[:, None, None]
-        q = begin[:, None] + displacement * at
-        y = np.concatenate([q, displacement * rate / T, displacement * acceleration / T**2], axis=2)
-        cost, tau = self.prepared.kernel.values(
-            y.reshape(-1, y.shape[2]), self.prepared.objective_parameters
-        )
-        energy = T[:, 0, 0] * (cost.reshape(len(end), -1) @ weights)
-        ratio = np.abs(tau / self.prepared.arm.active_limits.tau_max).max(axis=1)
-        return np.where(ratio.reshape(len(end), -1).max(axis=1) > 1, np.inf, energy)
 
     def motion(self, q: Array) -> tuple[Basis, Array]:
         """Spline space and control points (n, nq) [rad] of the motion with a rest at q."""

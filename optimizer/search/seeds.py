@@ -124,19 +124,32 @@ def estimates_between(
         rough: whether a single duration and half the instants suffice.
     """
     settings = ROUGH_ESTIMATE if rough else ESTIMATE
-    (at, rate, acceleration), weights = _quintic(settings)
-    displacement, count = (q_goal - q_start)[:, None], len(q_start)
-    best, q = np.full(count, np.inf), q_start[:, None] + displacement * at
-    tau_max = prepared.arm.active_limits.tau_max
+    best = np.full(len(q_start), np.inf)
     for durations in _durations(prepared.problem, shortest, settings.time_scales):
-        T = durations[:, None, None]
-        y = np.concatenate([q, displacement * rate / T, displacement * acceleration / T**2], axis=2)
-        cost, tau = prepared.kernel.values(y.reshape(-1, y.shape[2]), prepared.objective_parameters)
-        torque_ratio = np.abs(tau / tau_max).max(axis=1).reshape(count, -1).max(axis=1)
-        energy = durations * (cost.reshape(count, -1) @ weights)
+        energy, torque_ratio = of_quintics(prepared, q_start, q_goal, durations, settings)
         energy += np.abs(energy) * np.maximum(torque_ratio - 1, 0.0)
         best = np.minimum(best, energy + _waiting(prepared, q_goal, durations))
     return best
+
+
+def of_quintics(
+    prepared: PreparedProblem,
+    q_start: Array,
+    q_goal: Array,
+    durations: Array,
+    settings: EstimateSettings = ESTIMATE,
+) -> tuple[Array, Array]:
+    """Objectives (n,) [J] of quintics from q_start to q_goal (n, nq) [rad] in durations (n,) [s],
+    and their largest ratios (n,) of a torque to its limit.
+    """
+    (at, rate, acceleration), weights = _quintic(settings)
+    displacement, T, count = (q_goal - q_start)[:, None], durations[:, None, None], len(durations)
+    q = q_start[:, None] + displacement * at
+    y = np.concatenate([q, displacement * rate / T, displacement * acceleration / T**2], axis=2)
+    cost, tau = prepared.kernel.values(y.reshape(-1, y.shape[2]), prepared.objective_parameters)
+    ratio = np.abs(tau / prepared.arm.active_limits.tau_max).max(axis=1)
+    energy = durations * (cost.reshape(count, -1) @ weights)
+    return np.asarray(energy), np.asarray(ratio.reshape(count, -1).max(axis=1))
 
 
 def _waiting(prepared: PreparedProblem, q_goal: Array, durations: Array) -> Array:

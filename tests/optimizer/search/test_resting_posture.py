@@ -51,3 +51,14 @@ def test_it_needs_less_than_a_rest_by_hand(
     problem = Problem(arm=ARM, start=start, goal=goal, windings=False, **given)
     found = optimize(problem).energy.electrical.total
     assert found < evaluated.total.energy.electrical.total
+
+
+def test_a_dwell_of_an_hour_keeps_an_answer_that_is_certified_in_time() -> None:
+    """The certificate of a motion of an hour takes longer than the deadline."""
+    start = [0.0, -0.3, 0.3, 0.0, 0.0, 0.0]
+    goal = [0.3, -0.2, 0.1, 0.0, 0.1, 0.0]
+    arm = Arm(robot=ROBOT, collisions=False)
+    problem = Problem(arm=arm, start=start, goal=goal, windings=False, dwell=Dwell(3600.0))
+    found = optimize(problem)
+    assert found.status == "feasible"
+    assert found.duration < 3600.0
