@@ -331,8 +331,7 @@ class NoTrajectory(_SearchError):
         reasons = {each.reason for each in failed}
         if len(reasons) != 1 or not (reason := reasons.pop()):
             return self.detail
-        remedy = "" if ": give" in reason else " Relax a limit or allow a longer duration."
-        return f"Every candidate failed: {reason}.{remedy}"
+        return f"Every candidate failed: {reason}. A wider limit or a longer duration may help."
 
 
 class DeadlineExceeded(_SearchError):
