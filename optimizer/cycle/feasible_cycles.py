@@ -24,7 +24,7 @@ from joulepath.optimizer.cycle.time_allocation import total_duration
 from joulepath.optimizer.cycle.timed_cycle import TimedChain, TimedSearch
 from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.dynamics.interval import MotionEnergy
-from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline, lasting, retimed
 from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.result.solution import Solution
@@ -205,11 +205,11 @@ def allocated_cycle(timing: TimedSearch, timed: TimedChain) -> FeasibleCycle:
 def waitless_cycle(timing: TimedSearch, timed: TimedChain) -> FeasibleCycle | None:
     """The cycle of a timed chain with its wait shared out among the moves, for mechanical work.
 
-    Motions at a price of time are too short: their smoothed |tau v| is positive at rest, but rest
-    does no work. Longer motions may do less.
+    Motions at a price of time are too short, because the smoothed |tau v| of the NLP is positive at
+    rest. True work at rest is zero, so longer motions may need less.
 
     Returns:
-        The cycle; None without a wait, for electrical energy, or if a motion is not found in time.
+        The cycle; None without a wait, for electrical energy, or if a motion is not found.
     """
     allocation = timed.allocation
     if timing.cycle.objective != "mechanical" or not allocation.waited:
@@ -220,7 +220,8 @@ def waitless_cycle(timing: TimedSearch, timed: TimedChain) -> FeasibleCycle | No
     )
     try:
         solutions = _solutions(timing, timed.nodes, [factor * T for T in allocation.durations])
-    except (NoTrajectory, DeadlineExceeded):
+    except JoulepathError:
+        # the cycle with its wait is known
         return None
     motions = [each.trajectory.spline for each in solutions]
     return FeasibleCycle.of(timing, timed.nodes, motions, solutions=solutions)
