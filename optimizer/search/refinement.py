@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from operator import methodcaller
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from joulepath.optimizer.search.sharper_cost import sharpen_cost
 from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.search.state import DURATION_TOLERANCE, SearchState
 from joulepath.optimizer.solve.methods.free_spline import FREE_SPLINE
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 
 
@@ -144,7 +146,11 @@ def start_from_fastest(state: SearchState, candidate: Candidate) -> None:
     if _is_held_back(state, candidate):
         for duration in (0.0, candidate.spline.duration):
             if not state.deadline.passed:
-                improve(state, candidate, methodcaller("solve_from_fastest", duration))
+                improve(state, candidate, partial(_solve_from_fastest, duration))
+
+
+def _solve_from_fastest(duration: float, solver: Method) -> SolveResult:
+    return solver.solve_from_fastest(duration)
 
 
 def _is_held_back(state: SearchState, candidate: Candidate) -> bool:
