@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from pydantic_core import to_jsonable_python
+
 from joulepath.app.engine.result import csv_document
 from joulepath.app.schemas import studies as schemas
 from joulepath.app.store.studies import Entry, History, State, energy_of
@@ -82,7 +84,7 @@ def as_csv(history: History) -> bytes:
     rows: list[Iterable[Any]] = [_COLUMNS.values()]
     for entry in entries(history):
         row = entry | {
-            "created": entry["created"].isoformat().replace("+00:00", "Z"),
+            "created": to_jsonable_python(entry["created"]),
             "threshold_met": "true" if entry["threshold_met"] else "false",
         }
         rows.append([row[name] for name in _COLUMNS])
