@@ -32,8 +32,9 @@ the sum of the rotors' D = diag(rotor inertia) and the links', which is positive
     |q_1 - q_0|_D ≤ ∫ |v|_D dt ≤ ∫ min(s, A min(t, T - t)) dt = s T - s² / A,  s = sqrt(W).   (3)
 
 The least s for which (3) holds gives W ≥ s². A motion that takes less than T and then rests until T
-does the same work: the bound for the longest allowed duration holds for all. Under gravity, a fall
-may pay for the speed: for random motions of common arms, such a bound never exceeded the others.
+does the same work: the bound for the longest allowed duration holds for all. Under gravity, the arm
+can gain speed by falling. A similar bound then never exceeded (2) for 600 pairs of random
+configurations of a UR5e, a UR20 and a Panda, so it is left out.
 
 The bound is not tight for a motion in which one joint takes up the energy that gravity gives to
 another, because (1) adds up the joints before the absolute value, nor for a motion that could swing

@@ -76,17 +76,18 @@ def up_to_limits(
 
 
 def one_in_each_part(motion: SelfMotion, limits: Limits) -> Array:
-    """Members of a self-motion within limits, one of each part inside.
+    """Members of a self-motion within limits, one of each separate part that is found inside.
 
-    A part may be as short as the range of one joint. The arcs are halved wherever their boxes meet
-    the limits, until a middle is inside. Adjacent cells count as one part.
+    A part may be as short as the range of one joint. The arcs are divided into cells, and cells
+    whose boxes meet the limits are halved until a middle is inside. Adjacent cells count as one
+    part. A part may be missed where it only touches the limits, or where the boxes do not shrink.
 
     Args:
         motion: self-motion.
         limits: position limits.
 
     Returns:
-        The members (m, nq) [rad], m = 0 for a self-motion outside the limits.
+        The members (m, nq) [rad], m = 0 if none is found.
     """
     centre, width = (limits.q_min + limits.q_max) / 2, (limits.q_max - limits.q_min) / 2
     width = np.where(width < np.pi, width, np.inf)
