@@ -55,8 +55,8 @@ class DispatcherSettings:
 
 DISPATCHER = DispatcherSettings()
 
-PRUNING = timedelta(hours=1)
-"""Time between two deletions of old jobs."""
+PRUNING = 3600.0
+"""Time [s] between two deletions of old jobs."""
 
 
 @dataclass
@@ -64,7 +64,7 @@ class _Times:
     """When regular work was done last."""
 
     renewed: datetime
-    pruned: datetime | None = None
+    pruned: float | None = None
     looked: float = field(default=0.0)
     reported: float = field(default=0.0)
 
@@ -297,7 +297,8 @@ class Dispatcher:
     async def _watch(self) -> None:
         """Renews leases, stops cancelled requests, and deletes old jobs."""
         now, clock = self._now(), self._clock()
-        if self._held and now - self._times.renewed >= LEASE / 3:
+        # A clock that was set back would otherwise leave leases that outlast their holder.
+        if self._held and abs(now - self._times.renewed) >= LEASE / 3:
             await self._store.write(partial(leases.renew, holder=self.holder, until=now + LEASE))
             self._times.renewed = now
         if self._held and clock - self._times.looked >= DISPATCHER.look:
@@ -307,10 +308,10 @@ class Dispatcher:
             for each in held:
                 if (each.lease.key, each.lease.attempt) not in kept:
                     each.drop()
-        if self._times.pruned is None or now - self._times.pruned >= PRUNING:
+        if self._times.pruned is None or clock - self._times.pruned >= PRUNING:
             prune = partial(jobs.prune, max_age=timedelta(days=self._settings.answers_max_age))
             await self._store.write(prune, frees=True)
-            self._times.pruned = now
+            self._times.pruned = clock
 
     async def _report(self) -> None:
         """Records progress within requests."""

@@ -104,7 +104,8 @@ def conclude(session: Session, job: Job, now: datetime) -> None:
 
 def progress_is_due(job: Job, now: datetime) -> bool:
     """Whether the last event `progress` of a job is old enough for another one."""
-    return job.progressed is None or now - job.progressed >= PROGRESS_PERIOD
+    # the clock may have been set back since then
+    return job.progressed is None or abs(now - job.progressed) >= PROGRESS_PERIOD
 
 
 def record_progress(
@@ -127,14 +128,16 @@ def progress(job: Job, counts: Counts) -> float:
 
 
 def eta(job: Job, counts: Counts, now: datetime, within: float = 0.0) -> float | None:
-    """Time [s] until the job ends at its present speed; None before 5 % of its work is done.
-    `within` is the work that is done of running requests, in requests.
+    """Time [s] until the job ends at its present speed; None before 5 % of its work is done, and
+    while the clock, which was set back, shows a time before its start. `within` is the work that is
+    done of running requests, in requests.
     """
     ended = sum(counts[state] for state in ENDED) + within
     done, work = ended - job.ended_before, job.total - job.ended_before
     if job.ended is not None or job.started is None or done <= 0 or done < 0.05 * work:
         return None
-    return (now - job.started).total_seconds() * (job.total - ended) / done
+    taken = (now - job.started).total_seconds()
+    return None if taken < 0 else taken * (job.total - ended) / done
 
 
 def after(session: Session, job_id: str, number: int, limit: int) -> tuple[list[JobEvent], bool]:

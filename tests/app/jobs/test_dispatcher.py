@@ -161,6 +161,21 @@ async def test_a_long_request_is_not_taken_over(store: Store) -> None:
     await second.dispatcher.stop()
 
 
+async def test_a_clock_set_back_leaves_no_lease_in_the_future(
+    store: Store, service: Service
+) -> None:
+    job_id = await sent(service)
+    service.dispatcher.start()
+    await until(lambda: service.work.begun == [0])
+    service.moved, began = timedelta(hours=-1), now()
+
+    async def renewed() -> bool:
+        (only,) = await requests(store, job_id)
+        return only.leased_until is not None and only.leased_until < began
+
+    await until(renewed)
+
+
 async def test_a_request_that_kills_three_workers_fails(store: Store, service: Service) -> None:
     service.work.errors = [WorkerLost(), WorkerLost(), WorkerLost()]
     service.work.free.set()

@@ -332,3 +332,14 @@ async def test_progress_comes_twice_a_second_at_most(bench: Bench) -> None:
     assert progress[-1]["progress"] == 1.0
     view = await bench.store.read(partial(jobs.view, job_id=job_id))
     assert view.counts == {"waiting": 0, "running": 0, "done": 100, "failed": 0, "cancelled": 0}
+
+
+async def test_progress_continues_after_the_clock_was_set_back(bench: Bench) -> None:
+    job_id = await bench.create(100)
+    for done_before in range(100):
+        bench.now -= timedelta(hours=1) if done_before == 50 else timedelta()
+        await bench.settle("a", *map(done, await bench.lease("a")))
+        bench.now += timedelta(seconds=0.1)
+    progress = [event.data for event in await bench.events(job_id) if event.name == "progress"]
+    assert sum(each["progress"] > 0.5 for each in progress) >= 10
+    assert all(each["eta"] is None for each in progress if each["progress"] > 0.5)
