@@ -90,6 +90,18 @@ class FormBody(Response):
     radius: float = described("Its radius.", "m", 0.05)
 
 
+class ExampleMove(Response):
+    """A move about the first axis, with the flange pointing down, without collisions between links:
+    for a task without targets."""
+
+    start: list[float] = described(
+        "Joint positions at its start.", "rad", [0.0, -1.5708, -1.5708, -1.5708, 1.5708, 0.0]
+    )
+    goal: list[float] = described(
+        "Joint positions at its goal.", "rad", [1.5708, -1.5708, -1.5708, -1.5708, 1.5708, 0.0]
+    )
+
+
 class RobotDetail(RobotSummary):
     """The parameters of a robot, with their sources and trust letters."""
 
@@ -121,6 +133,10 @@ class RobotDetail(RobotSummary):
     form: list[list[FormBody]] = part(
         "What each link looks like by these parameters, base first: tubes between the joints and "
         "round housings with caps at them. No collision check sees it."
+    )
+    example_move: ExampleMove | None = part(
+        "A first move for a task without targets; null if the links overlap in every posture that "
+        "was tried."
     )
     has_meshes: bool = described(
         "Whether `GET /robots/{name}/meshes.glb` has the maker's meshes of the links.", None, True

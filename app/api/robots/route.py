@@ -13,6 +13,7 @@ from sqlalchemy.exc import IntegrityError
 
 from joulepath.app.api.robots.files import Name
 from joulepath.app.api.robots.models import (
+    ExampleMove,
     Friction,
     FrictionLaw,
     RobotDetail,
@@ -34,10 +35,13 @@ from joulepath.app.schemas.examples.own_arm import TITLE_EXAMPLES
 from joulepath.app.store import robots
 from joulepath.app.store.tables import OwnRobot, now
 from joulepath.models.form import link_bodies
+from joulepath.models.own_arm.robots import own_robot
 from joulepath.models.pictures import picture_sources
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import FrictionLaw as Law
 from joulepath.models.trust import TRUST, energy_trust
+from joulepath.optimizer.collision.example_move import ExampleMove as Move
+from joulepath.optimizer.collision.example_move import example_move
 from joulepath.optimizer.exceptions import UnknownRobot
 
 router = APIRouter(prefix="/robots", tags=["robots"], route_class=LargeBodyRoute)
@@ -110,7 +114,7 @@ async def add(
     except IntegrityError:  # another process has just added a robot of this name
         raise RobotExists from None
     set_location(request, response, f"/robots/{body.name}")
-    return _of_user(robot)
+    return await run_in_threadpool(_of_user, robot)
 
 
 @router.get(
@@ -123,8 +127,9 @@ async def show_robot(name: Name, store: ServiceStore) -> RobotDetail:
     """Kinematics, inertials, limits, drives and electronics, each parameter with its source and
     trust letter. Also the friction laws with their coefficients."""
     if name in robot_names():
-        return _detail(name, load_robot(name).figures, added=False, owner=None, warnings=[])
-    return _of_user(await store.read(partial(robots.get, name=name)))
+        return await run_in_threadpool(_bundled, name)
+    get = partial(robots.get, name=name)
+    return await store.read(lambda session: _of_user(get(session)))
 
 
 @router.put(
@@ -152,7 +157,7 @@ async def put(
     if is_new:
         response.status_code = 201
         set_location(request, response, f"/robots/{name}")
-    return _of_user(robot)
+    return await run_in_threadpool(_of_user, robot)
 
 
 @router.patch(
@@ -192,18 +197,40 @@ async def _computed(tasks: ServiceTasks, name: str, arm: OwnArm) -> OwnRobot:
     return OwnRobot(name=name, created=now(), owner=tasks.client.owner, **content)
 
 
+def _bundled(name: str) -> RobotDetail:
+    robot = load_robot(name)
+    return _detail(
+        name, robot.figures, added=False, owner=None, warnings=[], example=example_move(robot)
+    )
+
+
 def _of_user(row: OwnRobot) -> RobotDetail:
-    return _detail(row.name, row.figures, added=True, owner=row.owner, warnings=row.warnings)
+    try:
+        example = example_move(own_robot(row.name, row.figures))
+    except (ValueError, KeyError):  # an earlier version stored figures that make no robot now
+        example = None
+    owner, warnings = row.owner, row.warnings
+    return _detail(
+        row.name, row.figures, added=True, owner=owner, warnings=warnings, example=example
+    )
 
 
 def _detail(
-    name: str, figures: dict[str, Any], added: bool, owner: str | None, warnings: list[str]
+    name: str,
+    figures: dict[str, Any],
+    added: bool,
+    owner: str | None,
+    warnings: list[str],
+    example: Move | None,
 ) -> RobotDetail:
     content: dict[str, Any] = {section: figures.get(section) for section in _SECTIONS}
     content |= _summary(name, figures, added, owner)
     content |= {"trust": TRUST, "friction": _friction(figures), "warnings": warnings}
     content["form"] = [[asdict(body) for body in link] for link in link_bodies(figures)]
     content["has_meshes"] = picture_sources(name) is not None
+    content["example_move"] = example and ExampleMove(
+        start=example.start.tolist(), goal=example.goal.tolist()
+    )
     return RobotDetail(**content)
 
 

@@ -152,15 +152,32 @@ it("a mesh file larger than any fixture in metres is one in millimetres", async 
   expect(await read("solid empty\nendsolid empty\n").catch(() => null)).toBeNull();
 });
 
+const robot = (name: string, low: number[], high: number[], example_move: unknown = null) =>
+  ({
+    name,
+    joints: low.map((_, k) => `joint ${k}`),
+    limits: { position_min: { value: low }, position_max: { value: high } },
+    example_move,
+  }) as unknown as Robot;
+
 it("another robot takes what fits it", () => {
-  const limits = { position_min: { value: [-1, -3] }, position_max: { value: [2, -1] } };
-  const robot = { name: "two", joints: ["a", "b"], limits } as unknown as Robot;
+  const two = robot("two", [-1, -3], [2, -1]);
   const asked = { robot: "ur5e", start: { q: [1, 2, 3] }, goal: MOVE.goal, figures: "own" };
-  expect(withRobot(asked, robot)).toEqual({
+  expect(withRobot(asked, two, null)).toEqual({
     robot: "two",
     start: { q: [0.5, -2] },
     goal: MOVE.goal,
   });
+});
+
+it("a robot starts with its own example move, unless joints were given that it can reach", () => {
+  const first = robot("first", [-3, -3], [3, 3], { start: [0, 1], goal: [1, 1] });
+  const second = robot("second", [-3, -3], [3, 0], { start: [0, -1], goal: [2, -1] });
+  const of = (start: number[], goal: number[]) => ({ start: { q: start }, goal: { q: goal } });
+  const taken = (start: number[], goal: number[]) =>
+    withRobot({ robot: "first", ...of(start, goal) }, second, first);
+  expect(taken([0, 1], [1, 1])).toEqual({ robot: "second", ...of([0, -1], [2, -1]) });
+  expect(taken([0.5, -2], [0.5, 2])).toEqual({ robot: "second", ...of([0.5, -2], [2, -1]) });
 });
 
 it("another kind of time begins with the seconds of before", () => {

@@ -49,6 +49,10 @@ def test_a_robot_is_added_shown_and_deleted(client: TestClient) -> None:
     )
     assert made.default_motion is None and "drives.rotor_inertia" in made.warnings[-1]
     assert client.get("/robots/new_arm").json() == answer.json()
+    assert made.example_move is not None
+    ends = {end: {"q": getattr(made.example_move, end)} for end in ("start", "goal")}
+    posted = client.post("/optimize", json={"robot": "new_arm", **ends, **PATIENT})
+    assert posted.status_code == 200, posted.text
     listed = RobotList.model_validate_json(client.get("/robots").content).robots
     assert "new_arm" in [each.name for each in listed if each.added] and not listed[0].added
     refused(client.post("/robots", json={"name": "new_arm", **ARM}), RobotExists)

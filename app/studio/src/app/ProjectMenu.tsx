@@ -2,29 +2,25 @@ import { useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { useDraft } from "../ui/draft";
 import { Menu } from "../ui/Menu";
-import { newId } from "../store/persist";
 import { robotName } from "../store/request";
 import { examples } from "../store/service";
-import { EMPTY, project, replaceCell, request } from "../store/state";
-import { tell } from "../store/trouble";
+import { project, request } from "../store/state";
+import { tell, trying } from "../store/trouble";
 import type { ApiRequest } from "../store/types";
 import { dialog } from "./dialog";
 import { readFile, saveFile } from "./files";
-import { openCell, openFirst } from "../store/open";
+import { openCell, openFirst, openRobot } from "../store/open";
 
 /** New, open, save and rename; and the examples. */
 export function ProjectMenu() {
   const [known, setKnown] = useState<{ summary: string; value: ApiRequest }[] | null>(null);
   const load = () => void (known ?? examples().then(setKnown, (error) => tell(error)));
-  const create = () =>
-    replaceCell({
-      project: { id: newId(), name: "New cell" },
-      request: { ...EMPTY, robot: robotName(request.value) },
-    });
+  const create = trying(() => openRobot(robotName(request.value), false));
   const { field } = useDraft(project.value.name);
   const pick = (index: string) => {
     const example = known?.[Number(index)];
     if (index === "first") void openFirst();
+    else if (index === "robot") trying(() => openRobot(robotName(request.value), true))();
     else if (example) void openCell({ request: example.value }, example.summary, false);
   };
   return (
@@ -72,6 +68,7 @@ export function ProjectMenu() {
             onChange={(event) => pick(event.currentTarget.value)}
           >
             <option value="">choose …</option>
+            <option value="robot">First move of this robot</option>
             <option value="first">From a bin to a shelf</option>
             {known?.map(({ summary }, k) => (
               <option key={summary} value={k}>

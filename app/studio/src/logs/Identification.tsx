@@ -2,6 +2,7 @@ import { useEffect, useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { plain } from "../store/facts";
 import { get } from "../store/client";
+import { robotNow } from "../picture/pictured";
 import { withRobot } from "../store/edits";
 import { robotName } from "../store/request";
 import { robotOf } from "../store/service";
@@ -37,7 +38,7 @@ export function Identification() {
   const told = result.parameters.filter(({ identified }) => identified).length;
   const use = () => {
     const same = robotName(request.value) === robot.name;
-    const cell = same ? request.value : withRobot(request.value, robot);
+    const cell = same ? request.value : withRobot(request.value, robot, robotNow.value);
     edit({ ...cell, figures: found.figures });
     page.value = "cell";
     toast.value = `The cell has ${same ? "" : `a ${robot.title} with `}these figures now: Optimise computes with them.`;

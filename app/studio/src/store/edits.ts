@@ -53,21 +53,36 @@ export function asKindAgain(request: ApiRequest, kind: Kind, before: ApiRequest)
 }
 
 /**
- * The request for another robot, without the figures of one arm. Joint positions of another number
- * of joints become the middle of the robot's own.
+ * The request for another robot, without the figures of one arm. Joint positions stay if they are
+ * the user's own and within the limits; otherwise they become those of the robot's example move.
  */
-export function withRobot(request: ApiRequest, robot: Robot): ApiRequest {
-  const [least, most] = ["position_min", "position_max"].map(
-    (name) => robot.limits[name]?.value as number[],
-  );
-  const q = robot.joints.map((_, k) => ((least?.[k] ?? 0) + (most?.[k] ?? 0)) / 2);
+export function withRobot(request: ApiRequest, robot: Robot, before: Robot | null): ApiRequest {
   const own = put(put(request, "/robot", robot.name), "/figures", undefined);
   return rowsOf(own).reduce((next, row) => {
     const target = targetAt(own, row);
-    const fits = target.kind !== "joints" || target.q.length === q.length;
-    return fits ? next : put(next, row.pointer, { q });
+    if (target.kind !== "joints") return next;
+    if (isWithin(robot, target.q) && !isExample(before, target.q)) return next;
+    const end = row.role === "goal" ? "goal" : "start";
+    return put(next, row.pointer, { q: robot.example_move?.[end] ?? middleOf(robot) });
   }, own);
 }
+
+const isExample = (robot: Robot | null, q: number[]) =>
+  Object.values(robot?.example_move ?? {}).some((end) => isEqual(end, q));
+
+const isEqual = (one: number[], other: number[]) =>
+  one.length === other.length && one.every((value, k) => value === other[k]);
+
+const limitsOf = ({ joints, limits }: Robot): [number, number][] => {
+  const of = (name: string, joint: number) => (limits[name]?.value as number[])[joint] ?? 0;
+  return joints.map((_, joint) => [of("position_min", joint), of("position_max", joint)]);
+};
+
+const isWithin = (robot: Robot, q: number[]) =>
+  q.length === robot.joints.length &&
+  limitsOf(robot).every(([low, high], k) => low <= q[k]! && q[k]! <= high);
+
+const middleOf = (robot: Robot) => limitsOf(robot).map(([low, high]) => (low + high) / 2);
 
 const namesOf = (stops: Stop[]) => stops.map((stop, k) => stop?.name ?? `${k + 1}`);
 

@@ -3,6 +3,7 @@ import { batch } from "@preact/signals";
 import { get } from "./client";
 import { askedFor, newId, projects, type Saved } from "./persist";
 import { optimise, showAnswer } from "./run";
+import { robotOf } from "./service";
 import type { Cell } from "./share";
 import { page, replaceCell, toast } from "./state";
 import { tell } from "./trouble";
@@ -33,6 +34,15 @@ export async function openCell(cell: Cell, name: string, compute = true): Promis
   });
   page.value = "cell";
   if (compute) await optimise(cell.request).catch((error) => tell(error, cell.request));
+}
+
+/** A cell of a robot, with the start of its example move; or with the whole move, computed at once. */
+export async function openRobot(name: string, whole: boolean): Promise<void> {
+  const { title, example_move: move } = await robotOf(name);
+  const asked = { robot: name, ...(move ? { start: { q: move.start } } : {}) };
+  if (whole && move)
+    await openCell({ request: { ...asked, goal: { q: move.goal } } }, `First move of ${title}`);
+  else await openCell({ request: asked }, "New cell", false);
 }
 
 /** The project that was saved last; the example, where there is none. */

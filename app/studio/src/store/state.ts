@@ -74,14 +74,9 @@ export interface Trouble {
   fields: { pointer: Pointer; text: string }[];
 }
 
-export const EMPTY: ApiRequest = {
-  robot: "ur5e",
-  start: { q: [0, -1.5708, 1.5708, -1.5708, -1.5708, 0] },
-};
-
 export const project = signal<Project>({ id: "", name: "Untitled cell" });
 export const saved = signal<"" | "saving" | "saved" | "elsewhere" | "failed">("");
-export const request = signal<ApiRequest>(EMPTY);
+export const request = signal<ApiRequest>({});
 export const typed = signal<Record<Pointer, string>>({});
 export const answered = signal<Answered | null>(null);
 export const racers = signal<Racer[]>([]);

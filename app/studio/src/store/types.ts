@@ -216,6 +216,7 @@ export interface Robot {
   electronics: Record<string, Parameter>;
   friction: { laws: { coefficients: Record<string, Parameter> }[] };
   form: FormBody[][];
+  example_move: { start: number[]; goal: number[] } | null;
   has_meshes: boolean;
   warnings: string[];
 }

@@ -1,6 +1,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { Dialog } from "../ui/Dialog";
+import { robotNow } from "../picture/pictured";
 import { withRobot } from "../store/edits";
 import { robotName } from "../store/request";
 import { robotList, robotOf, type RobotSummary } from "../store/service";
@@ -20,7 +21,7 @@ export function RobotPicker({ onClose }: { onClose: () => void }) {
     if (name !== robotName(request.value))
       trying(async () => {
         const robot = await robotOf(name);
-        edit(withRobot(request.value, robot), typed.value);
+        edit(withRobot(request.value, robot, robotNow.value), typed.value);
       })();
     onClose();
   };

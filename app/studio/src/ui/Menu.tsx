@@ -29,19 +29,17 @@ export function Menu({ label, children, name, icon, id, quiet }: Props) {
       box.current.querySelector("summary")?.focus();
       event.stopPropagation();
     };
-    const filed = (event: Event) => {
+    const chosenFrom = (event: Event) => {
       const { current } = box;
-      if (
-        current?.contains(event.target as Node) &&
-        (event.target as HTMLInputElement).type === "file"
-      )
-        current.open = false;
+      const { type } = event.target as HTMLInputElement | HTMLSelectElement;
+      const isChoice = type === "file" || type === "select-one";
+      if (isChoice && current?.contains(event.target as Node)) current.open = false;
     };
     document.addEventListener("click", away);
-    document.addEventListener("change", filed);
+    document.addEventListener("change", chosenFrom);
     document.addEventListener("keydown", escape, true);
     return () => {
-      document.removeEventListener("change", filed);
+      document.removeEventListener("change", chosenFrom);
       document.removeEventListener("click", away);
       document.removeEventListener("keydown", escape, true);
     };
