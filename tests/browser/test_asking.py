@@ -20,6 +20,8 @@ from tests.browser.pages import (
     SHOWN,
     ask,
     fill_json,
+    findings,
+    new_cell,
     opened,
     show_json,
     state,
@@ -254,3 +256,32 @@ def test_a_page_stands_alone(browser: Browser, service: Server, tmp_path: Path) 
         alone.locator("#limits button").first.click()
         assert np.isfinite(alone.evaluate("() => studio.tcp()")).all()
         expect(alone.locator("#task")).to_have_count(0)
+
+
+def test_another_robot_begins_with_a_move_of_its_own(browser: Browser, service: Server) -> None:
+    """It is chosen by keys alone, in a list that is named for readers of the screen."""
+    with opened(browser, f"{service.url}/studio") as page:
+        new_cell(page)
+        page.locator("#change-robot").click()
+        search = page.get_by_role("combobox", name="Search robots")
+        expect(search).to_be_focused()
+        page.keyboard.type("kuka")
+        chosen = page.get_by_role("listbox", name="Search robots").locator("[aria-selected=true]")
+        expect(chosen).to_contain_text("iiwa")
+        page.keyboard.press("ArrowDown")
+        expect(chosen).to_contain_text("KR 10")
+        assert search.get_attribute("aria-activedescendant") == chosen.get_attribute("id")
+        assert not findings(page)
+        page.keyboard.press("Enter")
+        until(page, "() => studio.state.request.robot === 'kr10_r1100'")
+        move = service.get("/robots/kr10_r1100").json()["example_move"]
+        assert state(page, "request.start.q") == move["start"]
+        page.locator("#project > summary").click()
+        page.locator("#examples").select_option(label="First move of this robot")
+        until(page, SHOWN)
+        assert state(page, "request") == {
+            "robot": "kr10_r1100",
+            "start": {"q": move["start"]},
+            "goal": {"q": move["goal"]},
+        }
+        assert state(page, "answered.solution.robot") == "kr10_r1100"

@@ -66,7 +66,7 @@ def test_a_programmer_takes_a_program_to_the_controller(browser: Browser, servic
         expect(page.locator("#optimise")).to_be_disabled()
         page.locator("#change-robot").click()
         page.get_by_label("Search robots").fill("ur10e")
-        page.get_by_role("button", name="Universal Robots UR10e").click()
+        page.get_by_role("option", name="Universal Robots UR10e").click()
         until(page, "() => studio.state.request.robot === 'ur10e'")
         paste(page, PENDANT["goal"])
         goal = state(page, "request.goal.pose")
@@ -331,7 +331,7 @@ def test_an_engineer_compares_a_log_with_what_was_predicted(
         go(page, "Cell")
         page.locator("#change-robot").click()
         page.get_by_label("Search robots").fill("ur10e")
-        page.get_by_role("button", name="Universal Robots UR10e").click()
+        page.get_by_role("option", name="Universal Robots UR10e").click()
         go(page, "Logs")
         expect(page.locator("#logs")).to_contain_text("This log is of a Universal Robots UR5e")
         drawn = attached_to(page_of_log).answer["total"]["measured"]["electrical"]
