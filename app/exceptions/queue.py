@@ -41,8 +41,9 @@ class TooManyWaiting(Busy):
 
 
 class TooManyRequests(Busy):
-    """You have used your share of the service: requests in flight and waiting, connections, or
-    bytes of bodies and answers in flight, as `detail` says. Other clients are served meanwhile."""
+    """You have used your share of the service: requests in flight and waiting, waiting requests of
+    jobs, connections, or bytes of bodies and answers in flight, as `detail` says. Other clients are
+    served meanwhile."""
 
     status = 429
     title = "Too many requests"
@@ -63,6 +64,16 @@ class TooManyConnectionsOfClient(TooManyRequests):
         "You have as many connections, or as many requests ahead on one of them, as one client "
         "may: close those that you do not need, and use one for several requests, one after "
         "another."
+    )
+
+
+class TooManyWaitingOfClient(TooManyRequests):
+    """The client's requests of jobs that wait are half of those that the others leave room for."""
+
+    detail = (
+        "Your jobs would have more waiting requests than one client may, which is half of what the "
+        "other clients leave: send this job again when others of yours have ended, or send a "
+        "smaller one."
     )
 
 

@@ -158,12 +158,16 @@ class BundledRobot(RobotExists):
 
 
 class TooManyRobots(ServiceError):
-    """The service holds as many added robots as `JOULEPATH_MAX_ROBOTS` allows."""
+    """The service holds as many added robots as `JOULEPATH_MAX_ROBOTS` allows, or you have added
+    your share of them, which is half of what the other clients leave."""
 
     status = 409
     title = "Too many robots"
-    remedy = "Delete one that is not used with `DELETE /robots/{name}`."
-    detail = "The service holds as many added robots as it may: delete one that is not used."
+    remedy = "Delete one of yours that is not used with `DELETE /robots/{name}`."
+    detail = (
+        "The service holds as many added robots as it may, or you have added half of what other "
+        "clients leave: delete one that is not used."
+    )
 
 
 class NoMeshes(ServiceError):
@@ -193,7 +197,8 @@ class UnknownLog(ServiceError):
 
 @dataclass(eq=False)
 class TooManyLogs(ServiceError):
-    """The stored logs and this one would exceed `JOULEPATH_LOGS_MAX_BYTES`."""
+    """The stored logs and this one would exceed `JOULEPATH_LOGS_MAX_BYTES`, or your logs your
+    share, which is half of what the other clients leave."""
 
     status = 409
     title = "Too many logs"
@@ -207,8 +212,8 @@ class TooManyLogs(ServiceError):
 
     def __str__(self) -> str:
         return (
-            f"The stored logs would exceed {self.limit} bytes, compressed: delete some that are "
-            "not needed."
+            f"The stored logs would exceed {self.limit} bytes, compressed, or yours half of what "
+            "other clients leave of them: delete some of yours that are not needed."
         )
 
 
@@ -249,12 +254,16 @@ class FiguresInUse(ServiceError):
 
 
 class TooManyFigures(ServiceError):
-    """The service holds as many figures as `JOULEPATH_MAX_FIGURES` allows."""
+    """The service holds as many figures as `JOULEPATH_MAX_FIGURES` allows, or you have stored your
+    share of them, which is half of what the other clients leave."""
 
     status = 409
     title = "Too many figures"
-    remedy = "Delete some that are not used with `DELETE /figures/{id}`."
-    detail = "The service holds as many figures as it may: delete some that are not used."
+    remedy = "Delete some of yours that are not used with `DELETE /figures/{id}`."
+    detail = (
+        "The service holds as many figures as it may, or you have stored half of what other "
+        "clients leave: delete some that are not used."
+    )
 
 
 class KeyReused(ServiceError):

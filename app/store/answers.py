@@ -154,13 +154,18 @@ def delete(session: Session, answer_id: str, client: Client) -> None:
 
 
 def prune(session: Session, max_bytes: int, max_age: timedelta) -> None:
-    """Deletes answers without study or job: older than `max_age`, then the oldest above
-    `max_bytes`.
+    """Deletes answers without study or job: older than `max_age`, then those above `max_bytes`, the
+    oldest ones of the clients with most bytes: no client can displace the answers of another one
+    that has less.
     """
     free = and_(Answer.study_id.is_(None), Answer.job_id.is_(None))
     session.execute(delete_from(Answer).where(free, Answer.created < now() - max_age))
-    newest_first = func.sum(Answer.size).over(order_by=(Answer.created.desc(), Answer.id))
-    so_far = select(Answer.id, newest_first.label("bytes")).where(free).subquery()
+    newest_first = func.sum(Answer.size).over(
+        partition_by=Answer.owner, order_by=(Answer.created.desc(), Answer.id)
+    )
+    own = select(Answer.id, Answer.size, newest_first.label("bytes")).where(free).subquery()
+    least_first = func.sum(own.c.size).over(order_by=(own.c.bytes, own.c.id))
+    so_far = select(own.c.id, least_first.label("bytes")).subquery()
     session.execute(
         delete_from(Answer).where(
             Answer.id.in_(select(so_far.c.id).where(so_far.c.bytes > max_bytes))

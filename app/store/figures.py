@@ -7,11 +7,12 @@ import uuid
 from functools import partial
 from typing import Any
 
-from sqlalchemy import func, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from joulepath.app.access.client import Client, check_owner
 from joulepath.app.exceptions.stored import FiguresInUse, TooManyFigures, UnknownFigures
+from joulepath.app.store.shares import COUNT, room_of
 from joulepath.app.store.tables import Figures, Study, by_id, now
 
 _SPACE = uuid.UUID("6d0c5a0e-7b0e-5d5f-9a53-1d1f5b1c4a9e")
@@ -31,12 +32,12 @@ def new_figures(robot: str, content: dict[str, Any], owner: str | None) -> Figur
 def put(session: Session, figures: Figures, most: int) -> tuple[Figures, bool]:
     """Adds figures; returns the figures of this id, and whether they are new.
 
-    Raises TooManyFigures above `most`.
+    Raises TooManyFigures above the owner's share of `most`.
     """
     known = session.get(Figures, figures.id)
     if known is not None:
         return known, False
-    if (session.scalar(select(func.count()).select_from(Figures)) or 0) >= most:
+    if room_of(session, figures.owner, most, Figures.owner, COUNT)[0] < 1:
         raise TooManyFigures
     session.add(figures)
     return figures, True

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
-from sqlalchemy import ColumnElement, Select, func, insert, select
+from sqlalchemy import ColumnElement, Select, insert, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
 from joulepath.app.access.client import Client, check_owner
-from joulepath.app.exceptions.queue import TooManyWaiting
+from joulepath.app.exceptions.queue import TooManyWaiting, TooManyWaitingOfClient
 from joulepath.app.exceptions.stored import JobNotCancellable, KeyReused, UnknownJob
 from joulepath.app.store.cache import Meaning
 from joulepath.app.store.job_events import (
@@ -24,6 +24,7 @@ from joulepath.app.store.job_events import (
     set_state,
 )
 from joulepath.app.store.paging import following, having, newest_first, page_of
+from joulepath.app.store.shares import COUNT, room_of, stored_key
 from joulepath.app.store.tables import Answer, Job, JobRequest, by_id, new_id, now
 
 _AT_A_TIME = 50
@@ -68,15 +69,17 @@ def create(
 ) -> tuple[str, bool]:
     """Adds a job; returns its id, and whether a job with this key existed already.
 
-    Raises KeyReused if the existing job differs, or TooManyWaiting above `most_waiting` requests.
+    Raises KeyReused if the existing job differs; TooManyWaiting above `most_waiting` requests, and
+    TooManyWaitingOfClient above the owner's share of them.
     """
     if key is not None:
+        key = stored_key(key, owner)
         known = session.scalar(select(Job).where(Job.idempotency_key == key))
         if known is not None:
-            if (known.fingerprint, known.owner) != (new.fingerprint, owner):
+            if known.fingerprint != new.fingerprint:
                 raise KeyReused
             return known.id, True
-    _check_room(session, len(new.requests), most_waiting)
+    _check_room(session, len(new.requests), most_waiting, owner)
     job = Job(
         id=new_id(),
         name=new.name,
@@ -229,8 +232,8 @@ def stop(session: Session, job: Job, at: datetime) -> None:
 
 
 def retry(session: Session, job_id: str, client: Client, most_waiting: int) -> None:
-    """Lets failed and cancelled requests wait again. Raises UnknownJob, NotOwner or
-    TooManyWaiting."""
+    """Lets failed and cancelled requests wait again. Raises UnknownJob, NotOwner, TooManyWaiting or
+    TooManyWaitingOfClient."""
     job = _job(session, job_id, lock=True)
     check_owner(client, job.owner)
     again = select(JobRequest).where(
@@ -239,7 +242,7 @@ def retry(session: Session, job_id: str, client: Client, most_waiting: int) -> N
     found = list(session.scalars(again.options(defer(JobRequest.body))))
     if not found:
         return
-    _check_room(session, len(found), most_waiting)
+    _check_room(session, len(found), most_waiting, job.owner)
     for request in found:
         request.state, request.problem, request.deaths, request.preempted = "waiting", None, 0, 0
     session.flush()
@@ -297,12 +300,10 @@ def _job(session: Session, job_id: str, lock: bool = False) -> Job:
     return by_id(session, Job, job_id, UnknownJob, with_for_update=locking)
 
 
-def _check_room(session: Session, more: int, most_waiting: int) -> None:
-    waiting = (
-        session.scalar(
-            select(func.count()).select_from(JobRequest).where(JobRequest.state == "waiting")
-        )
-        or 0
-    )
-    if waiting + more > most_waiting:
+def _check_room(session: Session, more: int, most_waiting: int, owner: str | None) -> None:
+    waiting = JobRequest.state == "waiting"
+    own, room = room_of(session, owner, most_waiting, JobRequest.owner, COUNT, waiting)
+    if more > room:
         raise TooManyWaiting
+    if more > own:
+        raise TooManyWaitingOfClient

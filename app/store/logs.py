@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session, defer
 from joulepath.app.access.client import Client, check_owner
 from joulepath.app.exceptions.stored import TooManyLogs, UnknownLog
 from joulepath.app.store.paging import having, page_of
+from joulepath.app.store.shares import room_of
 from joulepath.app.store.tables import StoredLog, by_id
 
 _LIGHT = defer(StoredLog.body, raiseload=True)
@@ -16,9 +17,9 @@ _LIGHT = defer(StoredLog.body, raiseload=True)
 
 
 def add(session: Session, log: StoredLog, most: int) -> None:
-    """Adds a log. Raises TooManyLogs if all logs together would exceed `most` bytes."""
-    stored = session.scalar(select(func.sum(StoredLog.size))) or 0
-    if stored + log.size > most:
+    """Adds a log. Raises TooManyLogs if all logs together would exceed `most` bytes, or those of
+    the owner its share of them."""
+    if log.size > room_of(session, log.owner, most, StoredLog.owner, func.sum(StoredLog.size))[0]:
         raise TooManyLogs(most)
     session.add(log)
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from sqlalchemy import func, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from joulepath.app.access.client import Client, check_owner
 from joulepath.app.exceptions.stored import BundledRobot, RobotExists, TooManyRobots
+from joulepath.app.store.shares import COUNT, room_of
 from joulepath.app.store.tables import OwnRobot
 from joulepath.models.registry import robot_names
 from joulepath.optimizer.exceptions import UnknownRobot
@@ -36,17 +37,17 @@ def _own_names(session: Session) -> list[str]:
 
 
 def add(session: Session, robot: OwnRobot, most: int) -> None:
-    """Adds a robot. Raises RobotExists, or TooManyRobots above `most`."""
+    """Adds a robot. Raises RobotExists, or TooManyRobots above the owner's share of `most`."""
     if session.get(OwnRobot, robot.name) is not None:
         raise RobotExists
-    _check_count(session, most)
+    _check_count(session, most, robot.owner)
     session.add(robot)
 
 
 def put(session: Session, robot: OwnRobot, most: int, client: Client) -> bool:
     """Adds a robot, or replaces it under its owner; returns whether it is new.
 
-    Raises NotOwner, or TooManyRobots above `most`.
+    Raises NotOwner, or TooManyRobots above the owner's share of `most`.
     """
     known = session.get(OwnRobot, robot.name)
     if known is not None:
@@ -54,7 +55,7 @@ def put(session: Session, robot: OwnRobot, most: int, client: Client) -> bool:
         robot.owner = known.owner
         known.created, known.figures, known.warnings = robot.created, robot.figures, robot.warnings
         return False
-    _check_count(session, most)
+    _check_count(session, most, robot.owner)
     session.add(robot)
     return True
 
@@ -86,6 +87,6 @@ def _of_client(session: Session, name: str, client: Client) -> OwnRobot:
     return robot
 
 
-def _check_count(session: Session, most: int) -> None:
-    if (session.scalar(select(func.count()).select_from(OwnRobot)) or 0) >= most:
+def _check_count(session: Session, most: int, owner: str | None) -> None:
+    if room_of(session, owner, most, OwnRobot.owner, COUNT)[0] < 1:
         raise TooManyRobots

@@ -15,6 +15,7 @@ from joulepath.app.exceptions.stored import KeyReused, UnknownIteration, Unknown
 from joulepath.app.store import answers, cache
 from joulepath.app.store.cache import Answered
 from joulepath.app.store.paging import having, page_of
+from joulepath.app.store.shares import stored_key
 from joulepath.app.store.tables import Iteration, Study, by_id, new_id, now
 
 _LIGHT = defer(Iteration.request, raiseload=True)
@@ -85,7 +86,7 @@ def create(session: Session, study: Study) -> tuple[Study, bool]:
         if known is not None:
             if any(
                 getattr(known, name) != getattr(study, name)
-                for name in ("name", "robot", "figures", "objective", "threshold", "owner")
+                for name in ("name", "robot", "figures", "objective", "threshold")
             ):
                 raise KeyReused
             return known, True
@@ -227,7 +228,7 @@ def new_study(
         threshold=threshold,
         created=now(),
         owner=owner,
-        idempotency_key=key,
+        idempotency_key=None if key is None else stored_key(key, owner),
     )
 
 

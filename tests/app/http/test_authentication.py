@@ -221,11 +221,15 @@ def test_a_study_is_its_owners(guarded: Guarded) -> None:
     assert guarded.send("boss", "DELETE", study).status_code == 204
 
 
-def test_the_same_idempotency_key_of_another_client_is_not_replayed(guarded: Guarded) -> None:
+def test_clients_choose_their_idempotency_keys_independently(guarded: Guarded) -> None:
     key = {"Idempotency-Key": "try-1"}
-    assert guarded.send("press", "POST", "/studies", STUDY, **key).status_code == 201
+    first = guarded.send("press", "POST", "/studies", STUDY, **key)
     again = guarded.send("press", "POST", "/studies", STUDY, **key)
     assert again.headers["idempotency-replayed"] == "true"
+    assert again.json()["id"] == first.json()["id"]
+    other = guarded.send("cell", "POST", "/studies", STUDY | {"name": "Another"}, **key)
+    assert other.status_code == 201
+    assert other.json()["owner"] == "cell"
     refused(guarded.send("cell", "POST", "/studies", STUDY, **key), KeyReused)
 
 
