@@ -159,5 +159,7 @@ def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> N
             allow_methods=["*"],
             allow_headers=["*"],
             expose_headers=["*"],
+            # Chromium asks before a public page may call a service in a private network.
+            allow_private_network=True,
         )
     app.add_middleware(RequestContext, settings=settings, metrics=app.state.metrics)

@@ -44,12 +44,11 @@ async def swagger() -> HTMLResponse:
 
 @router.get("/redoc")
 async def redoc(request: Request) -> HTMLResponse:
-    """Redoc."""
-    root = request.scope.get("root_path", "")
+    """Redoc. Its addresses are relative, too."""
     page = get_redoc_html(
-        openapi_url=f"{root}/openapi.json",
+        openapi_url="openapi.json",
         title=request.app.title,
-        redoc_js_url=f"{root}/docs/redoc.standalone.js",
+        redoc_js_url="docs/redoc.standalone.js",
         redoc_favicon_url=_NO_PICTURE,
         with_google_fonts=False,
     )

@@ -38,6 +38,8 @@ def short_document(document: Json) -> Json:
     info = {key: document["info"][key] for key in ("title", "version")}
     info |= {"description": f"{document['info']['description']}\n\n{_ABOUT}"}
     short = {"openapi": "3.0.3", "info": info, "tags": document["tags"], "paths": paths}
+    # relative to the document: the requests of the page reach the service behind a proxy's path
+    short["servers"] = [{"url": ".."}]
     if "securitySchemes" in document["components"]:
         short["components"] = {"securitySchemes": document["components"]["securitySchemes"]}
     return short

@@ -113,6 +113,10 @@ def test_a_preflight(service: Server, method: str) -> None:
     assert allowed.headers["access-control-allow-origin"] == PAGE
     assert "authorization" in allowed.headers["access-control-allow-headers"].lower()
     assert "access-control-allow-credentials" not in allowed.headers
+    private = asked | {"Access_Control_Request_Private_Network": "true"}
+    allowed = send(service, "OPTIONS", "/studies", Origin=PAGE, **private)
+    assert allowed.status_code == 200
+    assert allowed.headers["access-control-allow-private-network"] == "true"
 
 
 def test_only_an_allowed_page_sees_an_answer(service: Server) -> None:

@@ -184,9 +184,16 @@ def test_documentation_needs_no_internet(client: TestClient, path: str) -> None:
     assets = re.findall(r'(?:src|href|spec-url)="(?!data:)([^"]+)"', page.text)
     assert len(assets) >= 2
     for asset in assets:
+        assert not asset.startswith("/"), "it holds behind a proxy's path, too"
         answer = client.get(urljoin(path, asset))
         assert answer.status_code == 200
         assert b"cdn.redoc" not in answer.content
+
+
+def test_requests_of_swagger_keep_the_path_of_a_proxy(client: TestClient) -> None:
+    (server,) = client.get("/docs/openapi.json").json()["servers"]
+    document = "https://robots.example/joulepath/docs/openapi.json"
+    assert urljoin(document, server["url"]) == "https://robots.example/joulepath/"
 
 
 def test_swagger_asks_no_validator(client: TestClient) -> None:
