@@ -7,10 +7,12 @@ from typing import Literal
 from fastapi import APIRouter
 
 from joulepath.app.api.shared.dependencies import ServiceCluster, ServiceEngine, ServiceStore
+from joulepath.app.engine.pool import Engine
 from joulepath.app.exceptions.queue import ClusterUnavailable, NotReady
 from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.common import Response, described, part
+from joulepath.app.store.store import Store
 
 router = APIRouter(tags=["health"])
 
@@ -51,6 +53,11 @@ async def readyz(engine: ServiceEngine, store: ServiceStore) -> Ready:
     if store.fault is not None:
         raise StoreUnavailable(store.fault)
     return Ready(status="ready", workers=engine.warm_workers)
+
+
+def is_ready(engine: Engine, store: Store) -> bool:
+    """Whether `/readyz` says ready."""
+    return engine.ready and store.fault is None
 
 
 class Machine(Response):

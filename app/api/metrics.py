@@ -6,6 +6,7 @@ import asyncio
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.api.health import is_ready
 from joulepath.app.api.shared.dependencies import ServiceEngine, ServiceMetrics, ServiceStore
 from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.http.openapi import problem_responses
@@ -31,8 +32,9 @@ async def metrics(
 ) -> Response:
     """Requests, durations, problems, the queue, the workers, the database and the process, in the
     text format of Prometheus."""
+    store_up = await _answers(store)
     document, media_type = measured.document(
-        request.headers.get("accept", ""), engine, await _answers(store)
+        request.headers.get("accept", ""), engine, is_ready(engine, store), store_up
     )
     return Response(document, media_type=media_type)
 

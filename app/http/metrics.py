@@ -58,9 +58,13 @@ class Metrics:
         if problem is not None:
             self._problems.labels(problem).inc()
 
-    def document(self, accept: str, engine: Engine, store_up: bool) -> tuple[bytes, str]:
-        """All measurements in the format preferred by the header Accept, and its media type."""
-        now = _Now(engine, store_up)
+    def document(
+        self, accept: str, engine: Engine, ready: bool, store_up: bool
+    ) -> tuple[bytes, str]:
+        """All measurements in the format preferred by the header Accept, and its media type.
+        `ready`: whether `/readyz` says so.
+        """
+        now = _Now(engine, ready, store_up)
         self._registry.register(now)
         try:
             encode, media_type = choose_encoder(accept)
@@ -72,8 +76,8 @@ class Metrics:
 class _Now(Collector):
     """Current values at the time of the request."""
 
-    def __init__(self, engine: Engine, store_up: bool) -> None:
-        self._engine, self._store_up = engine, store_up
+    def __init__(self, engine: Engine, ready: bool, store_up: bool) -> None:
+        self._engine, self._ready, self._store_up = engine, ready, store_up
 
     def collect(self) -> Iterator[Metric]:
         """One sample per value."""
@@ -89,7 +93,7 @@ class _Now(Collector):
                 self._engine.warm_workers,
             ),
             "joulepath_workers_busy": ("Workers that run a request.", queue.busy),
-            "joulepath_ready": ("Whether /readyz says ready.", self._engine.ready),
+            "joulepath_ready": ("Whether /readyz says ready.", self._ready),
             "joulepath_store_up": ("Whether the database answers.", self._store_up),
         }
         for name, (text, value) in gauges.items():

@@ -117,9 +117,13 @@ def test_a_database_that_does_not_answer() -> None:
     settings = Settings(
         workers=1, robots=(), database_url="postgresql://tester:secret-word@127.0.0.1:1/postgres"
     )
-    with recorded_workers(), TestClient(create_app(settings), base_url=LOCAL) as client:
+    app = create_app(settings)
+    with recorded_workers(), TestClient(app, base_url=LOCAL) as client:
+        until(lambda: app.state.engine.ready)
         text = client.get("/metrics").text
+        assert client.get("/readyz").status_code == 503
     assert "joulepath_store_up 0.0" in text
+    assert "joulepath_ready 0.0" in text, "as /readyz says"
 
 
 def test_the_format_of_openmetrics(service: Server) -> None:
