@@ -18,7 +18,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, _exit)
     signal.signal(signal.SIGINT, _exit)
 
-    from joulepath.app.engine.forkserver import start_forkserver
+    from joulepath.app.engine.forkserver import remove_sockets, start_forkserver
 
     start_forkserver()
 
@@ -42,6 +42,7 @@ def main() -> None:
             raise
         # The interpreter would take seconds to free all objects one by one.
         logging.shutdown()
+        remove_sockets()
         os._exit(0)
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from multiprocessing import forkserver
+import shutil
+from multiprocessing import forkserver, util
 
 CONTEXT = multiprocessing.get_context("forkserver")
 
@@ -20,3 +21,9 @@ def start_forkserver() -> None:
         os.environ.setdefault(name, "1")
     CONTEXT.set_forkserver_preload(["joulepath.app.tasks.preload"])
     forkserver.ensure_running()
+
+
+def remove_sockets() -> None:
+    """Removes the folder of the sockets of this process, for an end without the handlers of
+    `atexit`, which would remove it."""
+    shutil.rmtree(util.get_temp_dir(), ignore_errors=True)

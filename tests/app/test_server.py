@@ -13,6 +13,7 @@ import subprocess
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any, TypeVar
 
 import httpx2
@@ -266,12 +267,15 @@ def test_sigterm_answers_or_refuses_all_in_flight(
 
 
 @pytest.mark.long
-def test_sigterm_while_the_workers_warm_up() -> None:
+def test_sigterm_while_the_workers_warm_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
     with serving(warm=False, workers=1) as server:
         until(lambda: any(entry["message"] == "listening" for entry in server.logged()), WARM_UP)
         everyone = server.descendants()
+        assert list(tmp_path.glob("pymp-*")), "the sockets between the processes"
         assert server.terminate() == 0
         until(lambda: not any(alive(pid) for pid in everyone))
+    assert not list(tmp_path.glob("pymp-*"))
 
 
 @pytest.mark.long
