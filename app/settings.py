@@ -120,7 +120,8 @@ class Settings(BaseSettings):
     client_connections: int = Field(
         default=128,
         ge=1,
-        description="Connections of one address that may be open; of a trusted proxy, any number.",
+        description="Connections of one address that may be open; of a trusted proxy, any number. "
+        "Requests of one client without a complete answer.",
     )
     max_bytes_in_flight: int = Field(
         default=1 << 28,

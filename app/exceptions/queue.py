@@ -58,12 +58,12 @@ class TooManyRequests(Busy):
 
 
 class TooManyConnectionsOfClient(TooManyRequests):
-    """The client has as many connections, or requests ahead of their answers, as it may."""
+    """The client has as many connections, or requests without a complete answer, as it may."""
 
     detail = (
-        "You have as many connections, or as many requests ahead on one of them, as one client "
-        "may: close those that you do not need, and use one for several requests, one after "
-        "another."
+        "You have as many connections, or as many requests without a complete answer, as one "
+        "client may: close those that you do not need, such as streams of events, and use one for "
+        "several requests, one after another."
     )
 
 

@@ -3,6 +3,12 @@
 For any price λ of time, a cycle of duration D needs at least min Σ (E + λ T) - λ (D - dwells), with
 the minimum over all chains and durations T. A wait of power P is one more summand, so λ ≥ -P must
 hold.
+
+The price of the best cycle is not the best price of its bound. Where there is time to spare, a
+further second of a move saves as much as one of waiting costs, P, with the holding of the load. The
+bounds of single moves leave out this loss: at a price near -P they fall with every second, until
+the longest possible one. Therefore a second price is tried, just above minus the power that these
+bounds have.
 """
 
 from __future__ import annotations
@@ -17,6 +23,18 @@ from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.cycle.rest_energy import holding_powers, long_wait_powers
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import DURATIONS
+
+
+@dataclass(frozen=True)
+class TimedBoundSettings:
+    """Settings of the bound; any values give a valid bound."""
+
+    second_price: float = 0.95
+    """Second price over minus the power of electronics and inverters [1]: at 1, the bounds of moves
+    hardly depend on their duration, and take the longest one."""
+
+
+TIMED_BOUND = TimedBoundSettings()
 
 
 @dataclass(frozen=True)
@@ -50,8 +68,14 @@ class TimedBound:
         """
         if not all(leg.closed for leg in self.legs):
             return -np.inf
-        price = max(price, -self._least_waiting_power())
-        return min(self._least(price, self._longest_below(known)) - price * self.time, known)
+        arm, longest = self.cycle.arm, self._longest_below(known)
+        prices = {price}
+        if price < 0:
+            power = arm.base_power + float(arm.drives.inverter_constant.sum())
+            prices.add(-TIMED_BOUND.second_price * power)
+        # waiting must not pay
+        prices = {max(each, -self._least_waiting_power()) for each in prices}
+        return min(max(self._least(each, longest) - each * self.time for each in prices), known)
 
     @property
     def _rests_count(self) -> bool:

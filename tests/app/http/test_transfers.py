@@ -86,6 +86,27 @@ def test_bodies_count_against_a_share_and_a_total(tight: Server, path: str) -> N
     assert asked(tight, "127.0.0.1", large).status == 200, "whoever leaves gives its bytes back"
 
 
+def test_no_client_of_a_proxy_occupies_all_connections() -> None:
+    def of(client: str, request: bytes) -> bytes:
+        return request.replace(b"localhost", f"localhost\r\nX-Forwarded-For: {client}".encode())
+
+    def has_received(server: Server, count: int) -> bool:
+        return len(received(server, "/optimize")) >= count
+
+    probe = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"
+    with serving(recorded=True, client_connections=3, trusted_proxies=OTHER) as server:
+        with ExitStack() as stack:
+            for count in range(1, 4):
+                request = of("10.0.0.1", post("/optimize", b"{", declared=BODY))
+                stack.enter_context(connected(server, OTHER)).sendall(request)
+                until(partial(has_received, server, count))
+            refused = asked(server, OTHER, of("10.0.0.1", probe))
+            checked(TooManyRequests, refused.problem)
+            assert "streams of events" in refused.problem["detail"]
+            assert asked(server, OTHER, of("10.0.0.2", probe)).status == 200
+        until(lambda: asked(server, OTHER, of("10.0.0.1", probe)).status == 200)
+
+
 @pytest.mark.parametrize("path", ["/optimize", "/evaluate", "/studies/x/iterations"])
 def test_leaving_during_an_upload_is_one_line_in_the_log(tight: Server, path: str) -> None:
     before = len(tight.logged())
