@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from joulepath import (
+    Arm,
     BranchFilter,
     Cycle,
     CycleSolution,
@@ -30,12 +31,13 @@ from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.pair_solver import PairSolver
 from joulepath.optimizer.cycle.stop_layers import layers_of
 from joulepath.optimizer.cycle.time_allocation import TimeAllocation, total_duration
+from joulepath.optimizer.cycle.timed_bound import TIMED_BOUND, TimedBound
 from joulepath.optimizer.cycle.timed_cycle import TimedSearch
 from joulepath.optimizer.dynamics.dwell import holding_power
 from tests.optimizer.clocks import still
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.cycle.test_optimize_cycle import assert_true, planned
-from tests.optimizer.moves import AMPLE, fixed, torques
+from tests.optimizer.moves import AMPLE, ROBOT, fixed, torques
 from tests.refusals import refusal_of
 from tests.selection import long_but
 
@@ -223,6 +225,22 @@ def test_a_least_time_is_bounded_for_longer_cycles_and_longer_moves_too(
     for durations in product([0.4 * least, 0.7 * least, 1.1 * least, 3.0 * least], repeat=2):
         waited = max(least - sum(durations), 0.0)
         assert bound <= sum(moving(k, t) for k, t in enumerate(durations)) + waiting * waited
+
+
+def test_the_bound_counts_the_electronics_for_the_whole_time() -> None:
+    """No cycle draws less than electronics and inverters do, even if it saves more by slow moves:
+    an arm that holds its load at a great loss does so.
+    """
+    drives = replace(ROBOT.drives, copper=30 * ROBOT.drives.copper)
+    asked = Cycle(
+        arm=Arm(robot=replace(ROBOT, drives=drives), collisions=False),
+        start=HOME,
+        stops=[Stop(name="turned", target=HOME + TURN)],
+        windings=False,
+    )
+    drawn, time = asked.arm.base_power + asked.arm.drives.inverter_constant.sum(), 8.0
+    bound = TimedBound(asked, CycleSearch(asked, still).legs, time, time)
+    assert bound.at(-1.2 * drawn, np.inf) > TIMED_BOUND.second_price * drawn * time
 
 
 @pytest.mark.parametrize(
