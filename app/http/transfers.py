@@ -15,13 +15,14 @@ from joulepath.app.http.bytes_in_flight import BytesInFlight, Held
 from joulepath.app.http.client import client_of
 from joulepath.app.http.compression import Coding, Compression
 from joulepath.app.http.handlers import problem_response
+from joulepath.app.http.open_requests import OpenRequests
 
 
 class Transfers:
     """ASGI middleware: bodies within limits, and answers compressed and sent in pieces.
 
-    A request without a valid key in `keys`, or without an acceptable coding, is refused before its
-    body is read.
+    A request without a valid key in `keys`, without an acceptable coding, or beyond the share of
+    its client is refused before its body is read.
     """
 
     def __init__(self, app: ASGIApp, bodies: Bodies, keys: KeyRing | None) -> None:
@@ -31,6 +32,7 @@ class Transfers:
         self._in_flight = BytesInFlight(
             settings.max_bytes_in_flight, settings.client_bytes_in_flight
         )
+        self._open = OpenRequests(settings.client_connections)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes the request on."""
@@ -44,11 +46,13 @@ class Transfers:
             coding = self._compression.preferred(
                 ",".join(request.headers.getlist("accept-encoding"))
             )
+            client = client_of(request).name
+            is_open = self._open.another(client)
         except ServiceError as error:
             await (await problem_response(request, error))(scope, receive, send)
             return
-        client = client_of(request).name
         with (
+            is_open,
             Held(self._in_flight, client) as body_held,
             Held(self._in_flight, client) as answer_held,
         ):
