@@ -216,7 +216,9 @@ def _schema_of(parameter: dict[str, Any]) -> dict[str, Any]:
 def add_examples(schemas: dict[str, Any], node: dict[str, Any], example: Any) -> None:
     """Gives fields without an example their value in an example of the whole node."""
     if isinstance(example, list):
-        example = next(iter(example), None)
+        for each in example:
+            add_examples(schemas, node, each)
+        return
     if example is None:
         return
     for name in references(node):

@@ -4,6 +4,7 @@ speed.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import reduce
 from operator import add
@@ -27,7 +28,9 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.free_order import is_given_order_allowed
+from joulepath.optimizer.problem.stops import PlannedMove
 from joulepath.optimizer.result.baseline import Baseline
+from joulepath.optimizer.result.cycle import BrokenMove
 from joulepath.optimizer.result.energy import Sensitivity
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.baselines import baselines, nearest
@@ -122,7 +125,7 @@ def chain_baseline(
     )
     known = MotionEnergy(energy, sensitivity, sum(move.duration for move in moves))
     theirs = CycleEnergies(known, sum(move.energy.mechanical.total for move in moves))
-    baseline = cycle_baseline(search.cycle, name, duration, theirs, True, ours)
+    baseline = cycle_baseline(search.cycle, name, duration, theirs, [], ours)
     return replace(baseline, moves=moves_of(search, nodes, moves, {}))
 
 
@@ -139,8 +142,9 @@ def controller_default(
     Returns:
         The baseline; None if the default speed is not known, or the duration is not allowed.
     """
-    node, total, work, duration, held = start, 0.0, 0.0, 0.0, True
+    node, total, work, duration = start, 0.0, 0.0, 0.0
     nodes, sensitivities = [start], list[Sensitivity]()
+    motions = list[tuple[PlannedMove, str | None]]()
     for k, leg in enumerate(search.legs):
         if search.cycle.moves[k].tool_path is not None:
             # a controller's own motion along a line or path is not known: ours replaces it
@@ -161,7 +165,7 @@ def controller_default(
             return None
         total, work = total + move.electrical, work + move.mechanical
         duration += move.duration
-        held &= move.within_limits
+        motions.append((search.cycle.moves[k], move.reason))
         nodes.append(node)
         assert move.sensitivity is not None
         sensitivities.append(move.sensitivity)
@@ -175,7 +179,12 @@ def controller_default(
         duration - search.cycle.dwell_time,
     )
     return cycle_baseline(
-        search.cycle, "controller_default", duration, CycleEnergies(known, work), held, ours
+        search.cycle,
+        "controller_default",
+        duration,
+        CycleEnergies(known, work),
+        broken_moves(motions),
+        ours,
     )
 
 
@@ -186,11 +195,14 @@ def _default_motion(prepared: PreparedProblem, q_start: Array, q_goal: Array) ->
     return next((motion for motion in found if motion.name == "controller_default"), None)
 
 
+def broken_moves(motions: Iterable[tuple[PlannedMove, str | None]]) -> list[BrokenMove]:
+    """The moves whose motions break limits, by the reasons of all motions."""
+    return [BrokenMove(move.start, move.goal, why) for move, why in motions if why is not None]
+
+
 def recompared(cycle: Cycle, known: CycleBaseline, ours: CycleEnergies) -> CycleBaseline:
     """A baseline, compared with another solution of ours."""
-    again = cycle_baseline(
-        cycle, known.name, known.duration, known.energies, known.within_limits, ours
-    )
+    again = cycle_baseline(cycle, known.name, known.duration, known.energies, known.broken, ours)
     return replace(again, moves=known.moves)
 
 
@@ -199,7 +211,7 @@ def cycle_baseline(
     name: CycleBaselineName,
     duration: float,
     theirs: CycleEnergies,
-    held: bool,
+    broken: list[BrokenMove],
     ours: CycleEnergies,
 ) -> CycleBaseline:
     """Baseline with its saving.
@@ -209,7 +221,7 @@ def cycle_baseline(
         name: name of the baseline.
         duration: its duration with rests [s].
         theirs: its energies.
-        held: whether it is within the limits.
+        broken: its moves that break limits.
         ours: energies of our cycle.
     """
     electrical = cycle.objective == "electrical"
@@ -220,7 +232,7 @@ def cycle_baseline(
     return CycleBaseline(
         name=name,
         duration=duration,
-        within_limits=held,
+        broken=broken,
         saving=own,
         saving_interval=interval,
         energies=theirs,

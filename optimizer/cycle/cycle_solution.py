@@ -18,6 +18,7 @@ from joulepath.optimizer.presentation.chart import Chart, joint_curves
 from joulepath.optimizer.presentation.gap import gap_text, optimality_gap
 from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.result.cycle import (
+    BrokenMove,
     CycleCertificate,
     CycleClearance,
     CycleEnergy,
@@ -68,9 +69,7 @@ CycleBaselineName = Literal[
 
 @dataclass(frozen=True, kw_only=True)
 class CycleBaseline:
-    """Another cycle over the same stops, with the same payloads and dwells, in the requested
-    `time`.
-    """
+    """Another cycle over the same stops, with the same payloads, dwells and requested `time`."""
 
     name: CycleBaselineName
     """`stopping`: the best cycle that rests at the stops with `via`, too; the others then rest
@@ -83,16 +82,17 @@ class CycleBaseline:
     energy storage on the bus: `without_storage`, the best cycle on the same bus without it, beside
     `move_by_move` alone. In the configurations and times of the answer: `ruckig_slowed` and
     `straight`, every move but lines and paths by the motion of this name of `POST /optimize`.
-    `waypoints` and `blended` alike, in their own times, if fewer than two others keep every
-    limit."""
+    `waypoints` and `blended` alike, in their own times, if fewer than two others break none."""
     duration: Seconds
     """Duration of this cycle."""
     electrical: Joules = field(init=False)
     """Electrical energy of this cycle."""
     mechanical: Joules = field(init=False)
     """Mechanical work of its moves."""
-    within_limits: bool
+    within_limits: bool = field(init=False)
     """Whether every move is within the limits; collisions are checked at sample points."""
+    broken: list[BrokenMove]
+    """Its moves that break limits."""
     saving: Ratio | None
     """1 - energy of the answer / energy of this cycle, of the objective, in the same cycle time:
     the shorter one also waits, where the answer waits for least, until the longer one ends. Null
@@ -107,6 +107,7 @@ class CycleBaseline:
     def __post_init__(self) -> None:
         object.__setattr__(self, "electrical", self.energies.electrical.energy)
         object.__setattr__(self, "mechanical", self.energies.mechanical)
+        object.__setattr__(self, "within_limits", not self.broken)
 
 
 @dataclass(frozen=True, kw_only=True)

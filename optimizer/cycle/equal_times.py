@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from joulepath.optimizer.cycle.cycle_baselines import cycle_baseline
+from joulepath.optimizer.cycle.cycle_baselines import broken_moves, cycle_baseline
 from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleEnergies, CycleSolution
 from joulepath.optimizer.cycle.move_problem import problem_of
@@ -66,7 +66,7 @@ def _priced(cycle: Cycle, found: CycleSolution, each: CycleBaseline) -> CycleBas
         ours = replace(ours, electrical=_sum(ours.electrical, more))
     else:
         theirs = replace(theirs, electrical=_sum(theirs.electrical, more))
-    again = cycle_baseline(cycle, each.name, each.duration, theirs, True, ours)
+    again = cycle_baseline(cycle, each.name, each.duration, theirs, [], ours)
     return replace(each, saving=again.saving, saving_interval=again.saving_interval)
 
 
@@ -111,11 +111,21 @@ def _by_motions(
     for move, part in zip(found.moves, parts, strict=True):
         if part is not None:
             energies = _with_motion(energies, move.solution, part)
-    changed = [part for part in parts if part is not None]
+    changed = [
+        (move.planned, part)
+        for move, part in zip(found.moves, parts, strict=True)
+        if part is not None
+    ]
     if not changed:
         return None
-    held = all(part.within_limits for part in changed)
-    return cycle_baseline(cycle, name, found.duration, energies, held, ours)
+    return cycle_baseline(
+        cycle,
+        name,
+        found.duration,
+        energies,
+        broken_moves((move, part.reason) for move, part in changed),
+        ours,
+    )
 
 
 def _along_waypoints(cycle: Cycle, found: CycleSolution, end: Deadline) -> list[CycleBaseline]:
@@ -145,8 +155,8 @@ def _along_waypoints(cycle: Cycle, found: CycleSolution, end: Deadline) -> list[
             duration += way[name].duration - move.solution.duration
         if cycle.clamped_duration(duration) != duration:
             continue
-        held = all(way[name].within_limits for _, way in changed)
-        table.append(cycle_baseline(cycle, name, duration, energies, held, found.energies))
+        broken = broken_moves((move.planned, way[name].reason) for move, way in changed)
+        table.append(cycle_baseline(cycle, name, duration, energies, broken, found.energies))
     return table
 
 

@@ -13,6 +13,7 @@ from functools import cached_property, reduce
 from operator import add
 
 from joulepath.optimizer.cycle.cycle_baselines import (
+    broken_moves,
     cycle_baseline,
     dwell_energies_of_chain,
     rest_sensitivity_of_chain,
@@ -27,7 +28,9 @@ from joulepath.optimizer.dynamics.interval import MotionEnergy
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline, lasting, retimed
 from joulepath.optimizer.problem.problem import DURATIONS
+from joulepath.optimizer.problem.stops import PlannedMove
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.search.baseline_comparison import NOT_CONFIRMED
 from joulepath.optimizer.search.state import ENERGY_TOLERANCE
 
 
@@ -125,14 +128,19 @@ class FeasibleCycle:
         return saved / (FEASIBLE.slowing * sum(spline.duration for spline in self.motions))
 
     @cached_property
-    def confirmed(self) -> bool | None:
-        """Whether the certificate confirms all motions; None if the time is up."""
+    def unconfirmed(self) -> list[PlannedMove] | None:
+        """Moves whose motions the certificate does not confirm; None if the time is up."""
         if self.solutions is not None:
-            return True
-        pairs = zip(self.search.pairs(self.nodes), self.motions, strict=True)
+            return []
+        search = self.search
+        motions = zip(search.cycle.moves, search.pairs(self.nodes), self.motions, strict=True)
         try:
-            with watch(self.search.end):
-                return all(self.search.solver.confirms(*pair, spline) for pair, spline in pairs)
+            with watch(search.end):
+                return [
+                    move
+                    for move, pair, spline in motions
+                    if not search.solver.confirms(*pair, spline)
+                ]
         except DeadlinePassed:
             return None
 
@@ -156,9 +164,9 @@ class FeasibleCycle:
             The baseline; None if the time is up, or if the cycle is cheaper than ours and would
             have been the answer with more time.
         """
-        if self.name is None or self.confirmed is None:
+        if self.name is None or self.unconfirmed is None:
             return None
-        if self.confirmed and self.cost < ours.of(self.search.cycle.objective) * (
+        if not self.unconfirmed and self.cost < ours.of(self.search.cycle.objective) * (
             1 - FEASIBLE.rounding
         ):
             return None
@@ -179,7 +187,8 @@ class FeasibleCycle:
             sum(each.mechanical.total for each in moving),
         )
         duration = length + self.wait_time + search.cycle.dwell_time
-        return cycle_baseline(search.cycle, self.name, duration, theirs, self.confirmed, ours)
+        broken = broken_moves((move, NOT_CONFIRMED) for move in self.unconfirmed)
+        return cycle_baseline(search.cycle, self.name, duration, theirs, broken, ours)
 
 
 def allocated_cycle(timing: TimedSearch, timed: TimedChain) -> FeasibleCycle:

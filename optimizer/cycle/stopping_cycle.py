@@ -120,14 +120,14 @@ def stopping_baselines(
 ) -> list[CycleBaseline]:
     """The stopping cycle and its own baselines, compared with our cycle."""
     solution = rested.solution
-    theirs = cycle_baseline(cycle, "stopping", solution.duration, _own_energies(rested), True, ours)
+    theirs = cycle_baseline(cycle, "stopping", solution.duration, _own_energies(rested), [], ours)
     others = [
         cycle_baseline(
             cycle,
             each.name,
             each.duration,
             _energies_of_baseline(each, rested),
-            each.within_limits,
+            each.broken,
             ours,
         )
         for each in solution.baselines

@@ -277,5 +277,5 @@ def _baseline_with_storage(
     if name != "without_storage":
         needed = replace(needed, electrical=replace(needed.electrical, energy=theirs.value))
     return cycle_baseline(
-        cycle, name, sum(move.duration for move in theirs.moves), needed, True, ours
+        cycle, name, sum(move.duration for move in theirs.moves), needed, [], ours
     )

@@ -63,6 +63,18 @@ class LegReport:
     """Charge of the energy storage on the bus when it ends; null without one."""
 
 
+@dataclass(frozen=True)
+class BrokenMove:
+    """A move of another cycle that breaks limits."""
+
+    start: str
+    """Name of the stop at which it begins."""
+    goal: str
+    """Name of the stop at which it ends."""
+    reason: str
+    """The limits that it breaks, and the two bodies closer than allowed, with the amount."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class CycleClearance(Clearance):
     """Smallest clearance over all moves."""

@@ -190,7 +190,8 @@ def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
 
 def _broken(rival: dict[str, Any]) -> str:
     """Why no saving is claimed, in two words."""
-    reasons = (rival.get("reason") or "").split("; ")
+    moves = rival.get("broken", [rival])
+    reasons = [each for move in moves for each in (move.get("reason") or "").split("; ")]
     return "collides" if all("closer than" in each for each in reasons) else "breaks a limit"
 
 

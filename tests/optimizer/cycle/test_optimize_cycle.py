@@ -146,7 +146,13 @@ def test_cycles_are_true_and_not_above_move_by_move(seed: int, count: int) -> No
         assert whole.electrical == pytest.approx(
             rests + sum(each.electrical for each in parts), rel=ROUNDING
         )
-        assert whole.within_limits == all(each.within_limits for each in parts)
+        named = zip(found.moves, parts, strict=True)
+        assert [(each.start, each.goal, each.reason) for each in whole.broken] == [
+            (move.planned.start, move.planned.goal, part.reason)
+            for move, part in named
+            if part.reason is not None
+        ]
+        assert whole.within_limits == (not whole.broken)
 
 
 @pytest.mark.long

@@ -67,13 +67,11 @@ export function Baselines() {
       {broken.length > 0 && (
         <p class="hint">
           Hatched: breaks a limit, so no saving is claimed.{" "}
-          {first
-            .filter(({ reason }) => reason)
-            .map(({ name, reason }) => (
-              <span class="reason" key={name}>
-                {nameOf(name)}: {reason}.{" "}
-              </span>
-            ))}
+          {first.filter(reasonOf).map((each) => (
+            <span class="reason" key={each.name}>
+              {nameOf(each.name)}: {reasonOf(each)}.{" "}
+            </span>
+          ))}
           {broken.length > FEW && (
             <Button kind="link" onClick={() => setAll(!all)}>
               {all ? "Fewer" : `${broken.length - FEW} more`}
@@ -83,6 +81,16 @@ export function Baselines() {
       )}
     </Section>
   );
+}
+
+/** What a way breaks, in words; of a round, each limit once, with the moves that break it. */
+export function reasonOf({ reason, broken = [] }: Baseline): string {
+  if (reason) return reason;
+  const moves = new Map<string, string[]>();
+  for (const { start, goal, reason: all } of broken)
+    for (const one of new Set(all.split("; ")))
+      moves.set(one, [...(moves.get(one) ?? []), `${start} → ${goal}`]);
+  return [...moves].map(([one, names]) => `${one} (${names.join(", ")})`).join("; ");
 }
 
 function Own({ shown }: { shown: Answered }) {
