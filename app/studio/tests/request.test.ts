@@ -152,6 +152,16 @@ it("a mesh file larger than any fixture in metres is one in millimetres", async 
   expect(await read("solid empty\nendsolid empty\n").catch(() => null)).toBeNull();
 });
 
+it("a move keeps its branches at its goal as a round, and has its own turns again as a move", () => {
+  const branch = { wrist: "no_flip" };
+  const move = { ...MOVE, branch, windings: false };
+  const round = asKind(move, "round");
+  expect(round.stops).toEqual([{ name: "goal", target: MOVE.goal, branch }]);
+  expect(round.branch).toEqual(branch);
+  expect("windings" in round).toBe(false);
+  expect(asKindAgain(round, "move", ownFields(move))).toEqual(move);
+});
+
 const robot = (name: string, low: number[], high: number[], example_move: unknown = null) =>
   ({
     name,

@@ -4,9 +4,13 @@ import { freshName, isObject, listOf, rowsOf, targetAt, targetOf } from "./reque
 import type { Kind, Row } from "./request";
 import type { ApiRequest, Obstacle, Pose, Robot, Stop } from "./types";
 
-// fields that one kind of request has and another one has not
-const OF_MOVES = ["goal", "path", "duration", "dwell", "bound"];
-const OF_ROUNDS = ["stops", "order", "before", "together", "closed", "time", "hold", "wait"];
+// fields that one kind of request has and another one has not, or not in the same meaning
+const OF_BOTH = ["windings"]; // without them, a round leaves out turns that a move takes
+const OF_MOVES = ["goal", "path", "duration", "dwell", "bound", ...OF_BOTH];
+const OF_ROUNDS = [
+  ...["stops", "order", "before", "together", "closed", "time", "hold", "wait"],
+  ...OF_BOTH,
+];
 
 const without = (request: ApiRequest, fields: string[]): ApiRequest =>
   Object.fromEntries(Object.entries(request).filter(([name]) => !fields.includes(name)));
@@ -15,11 +19,14 @@ const without = (request: ApiRequest, fields: string[]): ApiRequest =>
 export function asKind(request: ApiRequest, kind: Kind): ApiRequest {
   if (kind === "round") {
     if (request.stops) return request;
+    // the branches of a move hold at both ends, those of a round at its start alone
+    const branch = isObject(request.branch) ? { branch: request.branch } : {};
     const via = listOf<Pose>(at(request, "/path/via")).map((pose, k): Stop => ({
       name: `via ${k + 1}`,
       target: { pose },
+      ...branch,
     }));
-    const goal: Stop = { name: "goal", target: request.goal ?? null };
+    const goal: Stop = { name: "goal", target: request.goal ?? null, ...branch };
     return { ...without(request, OF_MOVES), stops: [...via, goal] };
   }
   const last = listOf<Stop>(request.stops)
