@@ -178,15 +178,19 @@ def test_an_accepted_place_is_one_step_of_undo(found: Page) -> None:
     until(found, LOOKED)
     there = state(found, "looked.motion.asked")
     before = state(found, "request")
+    energy = state(found, "looked.energy")
+    answer = state(found, "answered.solution.id")
     found.locator("#accept-place").click()
     assert state(found, "request") == there != before
-    assert state(found, "stale") is True
-    expect(found.locator("#stale")).to_contain_text("pick X")
+    # its energy is shown without another computation
+    assert state(found, "stale") is False and state(found, "run") is None
+    assert state(found, "answered.solution.energy.electrical.total") == energy
     open_panel(found)
     expect(found.locator("#map-stale")).to_contain_text("older than")
     expect(found.locator("#place-legend")).to_have_count(0)
     found.locator("#undo").click()
     assert state(found, "request") == before and state(found, "stale") is False
+    assert state(found, "answered.solution.id") == answer
     expect(found.locator("#place-legend")).to_be_visible()
 
 

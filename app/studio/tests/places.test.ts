@@ -1,11 +1,23 @@
 import { beforeEach, describe, expect, it } from "vitest";
 import { IDENTITY, inverse, multiply, ofPose } from "../src/store/chain";
 import { put } from "../src/store/pointer";
-import { regionOf, regionTyped, roundOf } from "../src/store/placement";
+import { accept, regionOf, regionTyped, roundOf } from "../src/store/placement";
 import { columnsOf, coordinatesOf, movedTo, pitchOf, worldOf, yawOf } from "../src/store/places";
 import type { Place } from "../src/store/places";
 import { seenFrom } from "../src/store/seenFrom";
-import { edit, looked, looking, placing, played, replaceCell, request } from "../src/store/state";
+import {
+  answered,
+  edit,
+  looked,
+  looking,
+  placing,
+  played,
+  replaceCell,
+  request,
+  stale,
+  undo,
+  type Answered,
+} from "../src/store/state";
 import type { ApiRequest, Pose, Robot } from "../src/store/types";
 import { MOVE } from "./cells";
 
@@ -147,5 +159,23 @@ describe("a look at a place", () => {
     looking.value = { ...looking.value!, asked: request.value };
     placing.value = false;
     expect(looked.value).toBe(null);
+  });
+  it("is accepted with its motion, which one step of undo takes back", () => {
+    const before = (answered.value = { asked: MOVE, solution: {} } as Answered);
+    const there = put(MOVE, "/goal/pose/position", [0.1, 0.2, 0.3]);
+    const motion = { asked: there, cycle: null, solution: {} } as Answered;
+    placing.value = true;
+    looking.value = { asked: MOVE, robot: UR, pose: QUARTER, motion } as typeof looking.value;
+    accept();
+    expect([request.value, answered.value, stale.value]).toEqual([there, motion, false]);
+    undo();
+    expect([request.value, answered.value, stale.value]).toEqual([MOVE, before, false]);
+  });
+  it("is accepted without it where only a round of the move and its wait was computed", () => {
+    const motion = { asked: MOVE, cycle: {}, solution: {} } as Answered;
+    placing.value = true;
+    looking.value = { asked: MOVE, robot: UR, pose: QUARTER, motion } as typeof looking.value;
+    accept();
+    expect(answered.value).toBe(null);
   });
 });

@@ -44,6 +44,27 @@ it("what was typed stays where another field changes", () => {
   expect(typed.value).toEqual({ "/payload/mass": "1,6" });
 });
 
+it("undo and redo bring back the answers that belonged to the requests", () => {
+  const first = answer();
+  write("/payload/mass", 2, "2");
+  const second = answer();
+  undo();
+  expect(answered.value).toBe(first);
+  expect(stale.value).toBe(false);
+  redo();
+  expect(answered.value).toBe(second);
+  expect(stale.value).toBe(false);
+});
+
+it("an edit that was not computed leaves the answer that is older", () => {
+  const first = answer();
+  write("/payload/mass", 2, "2");
+  write("/payload/mass", 3, "3");
+  undo();
+  expect(answered.value).toBe(first);
+  expect(stale.value).toBe(true);
+});
+
 it("a new edit ends what could be done again", () => {
   write("/payload/mass", 1, "1");
   undo();

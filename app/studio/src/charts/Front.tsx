@@ -3,8 +3,8 @@ import { useMemo } from "preact/hooks";
 import type uPlot from "uplot";
 import { Button } from "../ui/Button";
 import { style } from "../ui/style";
-import { get } from "../store/client";
 import { compute, showAnswer } from "../store/run";
+import { keptAnswer } from "../store/service";
 import { save } from "../store/share";
 import { answered, run, stale } from "../store/state";
 import { trying } from "../store/trouble";
@@ -36,7 +36,7 @@ const csvOf = (points: Point[]) =>
 
 const load = async (path: string) => {
   const { asked } = front.value!;
-  await showAnswer((await get<{ answer: unknown }>(path)).answer, asked);
+  await showAnswer(await keptAnswer(path), asked);
 };
 
 /** The least energy of each duration. A click on a point loads its motion. */

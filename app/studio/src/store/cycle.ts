@@ -1,7 +1,6 @@
 // Whole rounds: their legs, played as one motion.
 import { obstaclesOf } from "./chain";
-import { get } from "./client";
-import { robotOf } from "./service";
+import { keptAnswer, robotOf } from "./service";
 import type { Answered, CycleShown } from "./state";
 import { dressedLater } from "./tools";
 import type { ApiRequest, Configuration, Cycle, Leg, Solution, Trajectory } from "./types";
@@ -18,9 +17,7 @@ export async function cycleAnswered(
 ): Promise<Answered> {
   const robot = await robotOf(cycle.robot);
   const moves = await Promise.all(
-    cycle.legs.map(async ({ answer }) =>
-      answer ? (await get<{ answer: Solution }>(answer.replace(/^\//, ""))).answer : null,
-    ),
+    cycle.legs.map(({ answer }) => (answer ? keptAnswer<Solution>(answer) : null)),
   );
   const first = moves.find((move) => move !== null);
   if (!first) throw new Error("This round has no move that could be shown.");
@@ -33,10 +30,6 @@ export async function cycleAnswered(
     trajectory: joined(cycle.legs, moves),
     candidates: [],
     candidate_counts: {},
-    baselines: cycle.baselines.map((each) => ({
-      ...each,
-      reason: each.within_limits ? null : (each.reason ?? "a limit of a move"),
-    })),
     certificate: { ...first.certificate, ...cycle.certificate, clearance },
     branch: { start: cycle.legs[0]!.start, goal: cycle.legs.at(-1)!.goal },
   };

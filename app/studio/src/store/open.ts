@@ -3,7 +3,7 @@ import { batch } from "@preact/signals";
 import { get } from "./client";
 import { askedFor, newId, projects, type Saved } from "./persist";
 import { optimise, showAnswer } from "./run";
-import { robotOf } from "./service";
+import { keptAnswer, robotOf } from "./service";
 import type { Cell } from "./share";
 import { page, replaceCell, toast } from "./state";
 import { tell } from "./trouble";
@@ -68,10 +68,8 @@ export async function openProject(project: Saved): Promise<void> {
   page.value = "cell";
   if (!project.answer || !project.asked) return;
   try {
-    const { answer } = await get<{ answer: unknown }>(
-      `answers/${encodeURIComponent(project.answer)}`,
-    );
-    await showAnswer(answer, project.asked);
+    const path = `answers/${encodeURIComponent(project.answer)}`;
+    await showAnswer(await keptAnswer(path), project.asked);
   } catch {
     toast.value = "The answer of this project is no longer kept: optimise again.";
   }
@@ -79,9 +77,7 @@ export async function openProject(project: Saved): Promise<void> {
 
 /** A kept answer by its id or path, with its request as it was typed. Throws Problem. */
 export async function openKept(path: string): Promise<void> {
-  const address = path.includes("/")
-    ? path.replace(/^\//, "")
-    : `answers/${encodeURIComponent(path)}`;
+  const address = path.includes("/") ? path : `answers/${encodeURIComponent(path)}`;
   const { name, request: sent, typed, answer } = await get<Kept>(address);
   if (!answer?.branch && !answer?.legs)
     throw new Error("Only motions and rounds are shown here: this answer is of another kind.");

@@ -1,17 +1,17 @@
 // Where to put the robot: the region, the map of the service, and the place that is looked at.
 import { batch, computed, signal } from "@preact/signals";
 import { inverse, multiply, ofPose, poseOfMatrix, type Matrix } from "./chain";
-import { get } from "./client";
 import { diff } from "./diff";
 import { asKind } from "./edits";
 import { capital, energyOf } from "./facts";
 import { placesOf, REASONS, worldOf, yawOf } from "./places";
-import type { Layer, Mount, Place, PlacementAnswer } from "./places";
+import type { Layer, Mount, Place, PlacedRound, PlacementAnswer } from "./places";
 import { deadlineOf, endpointOf, isObject, robotName } from "./request";
 import { answeredBy, compute, named } from "./run";
 import { seenFrom } from "./seenFrom";
-import { robotOf } from "./service";
+import { keptAnswer, robotOf } from "./service";
 import {
+  display,
   edit,
   looked,
   looking,
@@ -24,7 +24,7 @@ import {
   typed,
   type Looked,
 } from "./state";
-import type { ApiRequest } from "./types";
+import type { ApiRequest, Cycle } from "./types";
 import { said } from "./trouble";
 import { typedValue, type UnitName } from "./units";
 
@@ -154,8 +154,9 @@ export async function search(): Promise<void> {
   }
 }
 
-export const bestPose = ({ answer, world }: Mapped) =>
-  multiply(inverse(world), ofPose(answer.best.base));
+const poseOf = ({ world }: Mapped, { base }: PlacedRound) => multiply(inverse(world), ofPose(base));
+
+export const bestPose = (map: Mapped) => poseOf(map, map.answer.best);
 
 /** Moves the base in the picture, without computing. Throws Problem. */
 export async function moveBase(pose: Matrix): Promise<Looked> {
@@ -211,10 +212,14 @@ const isAt = (one: Matrix, other: Matrix) =>
 /** What the task needs at a place: a kept answer of the map, or a new one. Throws Problem. */
 async function motionAt({ asked, robot, pose }: Looked, map: Mapped | null) {
   const there = seenFrom(asked, pose, robot);
-  const kept = map && isAt(bestPose(map), pose) ? map.answer.best.cycles[0]!.answer : null;
+  const placed = [map?.answer.best, map?.answer.nominal];
+  const kept = placed.find((each) => each && isAt(poseOf(map!, each), pose));
   if (kept) {
-    const { answer } = await get<{ answer: unknown }>(kept.replace(/^\//, ""));
-    return answeredBy(answer, there, null);
+    const round = await keptAnswer<Cycle>(kept.cycles[0]!.answer);
+    // a single move was placed as a round of this move alone
+    const [leg, ...rests] = round.legs;
+    const move = asked.stops === undefined && !rests.length ? leg!.answer : null;
+    return answeredBy(move ? await keptAnswer(move) : round, there, null);
   }
   const answer = await compute(endpointOf(asked), there, deadlineOf(asked));
   if (!answer) return null;
@@ -229,12 +234,15 @@ export function close(): void {
   if (selected.value === BASE) selected.value = null;
 }
 
-/** Writes the place that is looked at into the task, as one step of undo. */
+/** Writes the place that is looked at into the task with its motion, as one step of undo. */
 export function accept(): void {
-  const now = looked.value;
-  if (!now) return;
+  const motion = looked.value?.motion;
+  if (!motion?.asked) return;
+  const { asked } = motion;
   batch(() => {
-    edit(seenFrom(now.asked, now.pose, now.robot), typed.value);
+    edit(asked, typed.value);
+    // of a move with its wait, only the round of both was computed
+    if (Boolean(motion.cycle) === (endpointOf(asked) === "cycle")) display(motion);
     close();
     toast.value = "All poses are seen from the new place of the base now.";
   });

@@ -8,14 +8,11 @@ import { robotOf } from "./service";
 import { dressedLater } from "./tools";
 import { deadlineOf, endpointOf } from "./request";
 import {
-  answered,
-  ghosts,
+  display,
   project,
-  racers,
   request,
   run,
   tab,
-  time,
   toast,
   trouble,
   typed,
@@ -57,13 +54,7 @@ export async function showAnswer(
   asked: ApiRequest | null,
   took: number | null = null,
 ): Promise<void> {
-  const next = await answeredBy(answer, asked, took);
-  batch(() => {
-    answered.value = next;
-    racers.value = [];
-    ghosts.value = [];
-    time.value = 0;
-  });
+  display(await answeredBy(answer, asked, took));
 }
 
 /** An answer of `POST /optimize` or `POST /cycle` as something to show. Throws Problem. */

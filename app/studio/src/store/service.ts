@@ -35,6 +35,10 @@ function once<T>(known: Map<string, Promise<T>>, name: string, ask: () => Promis
   return asked;
 }
 
+/** A kept answer by its path. Throws Problem. */
+export const keptAnswer = async <T>(path: string): Promise<T> =>
+  (await get<{ answer: T }>(path)).answer;
+
 export interface RobotSummary {
   name: string;
   title: string;

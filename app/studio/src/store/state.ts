@@ -142,6 +142,8 @@ export const duration = computed(
 interface Snapshot {
   request: ApiRequest;
   typed: Record<Pointer, string>;
+  /** The answer to the request, if it was shown. */
+  answer: Answered | null;
 }
 
 const MOST = 200;
@@ -152,7 +154,21 @@ let lastEdit = { name: "", at: 0 };
 export const canUndo = computed(() => past.value.length > 0);
 export const canRedo = computed(() => future.value.length > 0);
 
-const present = (): Snapshot => ({ request: request.value, typed: typed.value });
+const present = (): Snapshot => ({
+  request: request.value,
+  typed: typed.value,
+  answer: stale.value ? null : answered.value,
+});
+
+/** Shows an answer from its start, with nothing beside it. */
+export function display(answer: Answered): void {
+  batch(() => {
+    answered.value = answer;
+    racers.value = [];
+    ghosts.value = [];
+    time.value = 0;
+  });
+}
 
 /** Changes the request. Edits of one `name` within half a second are one step of undo. */
 export function edit(
@@ -190,6 +206,7 @@ function step(from: typeof past, to: typeof past): void {
     request.value = snapshot.request;
     typed.value = snapshot.typed;
     trouble.value = null;
+    if (snapshot.answer && snapshot.answer !== answered.value) display(snapshot.answer);
   });
   lastEdit = { name: "", at: 0 };
 }
