@@ -14,6 +14,7 @@ import { answered, page, placing, stale, tab } from "../store/state";
 import { figure } from "../store/units";
 import { Dialogs } from "./Dialogs";
 import { onKey } from "./keys";
+import { Reports } from "./Reports";
 import { Toast } from "./Toast";
 import { TopBar } from "./TopBar";
 
@@ -67,6 +68,7 @@ export function App() {
         </nav>
       )}
       <Dialogs />
+      <Reports />
       <Toast />
     </div>
   );

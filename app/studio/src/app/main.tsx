@@ -4,6 +4,7 @@ import "../styles/tokens.css";
 import "../styles/base.css";
 import "../styles/controls.css";
 import "../styles/surfaces.css";
+import "../styles/reports.css";
 import "../styles/task.css";
 import "../styles/forms.css";
 import "../styles/targets.css";

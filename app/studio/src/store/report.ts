@@ -1,11 +1,13 @@
 // Reports: pages for those who decide.
-import { send } from "./client";
+import { signal } from "@preact/signals";
+import { brokenOff, send } from "./client";
 import { costsOf, DEFAULT_ECONOMICS, type Economics } from "./economics";
 import { periodOf } from "./facts";
 import { mapShown } from "./placement";
 import { endpointOf } from "./request";
 import { save } from "./share";
-import { answered, economics, project, toast } from "./state";
+import { answered, economics, project } from "./state";
+import { said } from "./trouble";
 
 export type ReportFormat = "html" | "pdf";
 
@@ -26,7 +28,7 @@ export function costsFor(given: Economics, cyclesPerShift: number | null) {
   };
 }
 
-/** A report of the answer that is shown, as a file. Throws Problem. */
+/** A report of the answer that is shown, as a file. */
 export async function reportAnswer(format: ReportFormat): Promise<void> {
   const shown = answered.value;
   if (!shown?.asked) return;
@@ -41,7 +43,7 @@ export async function reportAnswer(format: ReportFormat): Promise<void> {
   await report(body, name, format);
 }
 
-/** A report of the map that is shown, as a file. Throws Problem. */
+/** A report of the map that is shown, as a file. */
 export async function reportPlaces(format: ReportFormat): Promise<void> {
   const map = mapShown.value;
   if (!map) return;
@@ -50,19 +52,69 @@ export async function reportPlaces(format: ReportFormat): Promise<void> {
   await report({ placement: body, answer: answer.id, costs }, project.value.name, format);
 }
 
-/** A report as a file. Throws Problem. */
+/** Reports that are being written, and what became of them, until they are dismissed. */
+export const reports = signal<Report[]>([]);
+
+export interface Report {
+  title: string;
+  format: ReportFormat;
+  began: number;
+  state: "writing" | "saved" | "failed";
+  /** Why it failed. */
+  why: string;
+  /** Address of the file in this browser, once it is written. */
+  address: string;
+  again: () => Promise<void>;
+  /** Stops it, and takes it from the list. */
+  dismiss: () => void;
+}
+
+export const fileOf = ({ title, format }: Report) =>
+  `${title.replace(/[^\w-]+/g, "-").toLowerCase() || "report"}.${format}`;
+
+/** Writes a report, and saves it as a file; `reports` tells how far it is. */
 export async function report(
   body: Record<string, unknown>,
   title: string,
   format: ReportFormat,
 ): Promise<void> {
-  toast.value = "The report is being written …";
-  const response = await send("report", {
-    method: "POST",
-    body: JSON.stringify({ ...body, title: title.slice(0, 120), format }),
-    headers: { "Content-Type": "application/json" },
-  });
-  const file = title.replace(/[^\w-]+/g, "-").toLowerCase() || "report";
-  save(`${file}.${format}`, await response.blob());
-  toast.value = "The report is saved; request and answer are attached to it.";
+  const own = new AbortController();
+  let now: Report = {
+    title,
+    format,
+    began: performance.now(),
+    state: "writing",
+    why: "",
+    address: "",
+    again: () => {
+      now.dismiss();
+      return report(body, title, format);
+    },
+    dismiss: () => {
+      own.abort();
+      URL.revokeObjectURL(now.address);
+      reports.value = reports.value.filter((each) => each !== now);
+    },
+  };
+  const next = (more: Partial<Report>) => {
+    const before = now;
+    now = { ...now, ...more };
+    reports.value = reports.value.map((each) => (each === before ? now : each));
+  };
+  reports.value = [...reports.value, now];
+  try {
+    const response = await send("report", {
+      method: "POST",
+      body: JSON.stringify({ ...body, title: title.slice(0, 120), format }),
+      headers: { "Content-Type": "application/json" },
+      signal: own.signal,
+    });
+    const file = await response.blob().catch((error: unknown) => {
+      throw brokenOff(error);
+    });
+    next({ state: "saved", address: URL.createObjectURL(file) });
+    save(fileOf(now), file);
+  } catch (error) {
+    if (!own.signal.aborted) next({ state: "failed", why: said(error) });
+  }
 }
