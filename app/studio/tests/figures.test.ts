@@ -111,7 +111,7 @@ it("a table of moves becomes requests of the cell", () => {
   expect(read.moves[0]).toMatchObject({ from: "bin", to: "shelf", mass: 1.5 });
 });
 
-it("the moves of a job have names, also in its CSV", () => {
+it("the moves of a job have names, also in its CSV", async () => {
   const move = { from: "bin\u200b 1", to: "s".repeat(300), mass: null, start: "", goal: "" };
   expect(moveName(move)).toBe(`bin 1 to ${"s".repeat(191)}`);
   const row = { index: 0, name: 'a "b", c', kind: "optimize", state: "done", answer: "/answers/1" };
@@ -119,8 +119,10 @@ it("the moves of a job have names, also in its CSV", () => {
     (each) => ({ ...each, energy: 1, duration: 2, problem: null }) as JobRow,
   );
   const notes = { id: "j", source: "", masses: [1.5, null], requests: [] };
-  const shown = { job: {} as Job, rows, notes, details: null };
-  expect(csvOfJob(shown).split("\n").slice(0, 3)).toEqual([
+  const none = { mass: null, interval: null, rival: null, rivalEnergy: null, saving: null };
+  const details = new Map(rows.map(({ index }) => [index, none]));
+  const shown = { job: {} as Job, rows, notes, details };
+  expect((await csvOfJob(shown)).split("\n").slice(0, 3)).toEqual([
     "no,move,kg,state,duration_s,energy_J,p5_J,p95_J,rival,rival_J,saving,problem,answer",
     '1,"a ""b"", c",1.5,done,2,1,,,,,,,/answers/1',
     "2,move 2,,done,2,1,,,,,,,/answers/1",

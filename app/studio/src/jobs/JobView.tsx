@@ -12,6 +12,7 @@ import { asShown, figure, percent } from "../store/units";
 import {
   csvOfJob,
   isOver,
+  lacksDetails,
   loadDetails,
   loadJob,
   massOf,
@@ -56,13 +57,10 @@ export function JobView({ shown }: { shown: Opened }) {
         <Button
           icon="file"
           id="job-csv"
-          onClick={() =>
-            save(
-              `${(job.name ?? "job").replace(/[^\w-]+/g, "-").toLowerCase()}.csv`,
-              csvOfJob(shown),
-              "text/csv",
-            )
-          }
+          onClick={trying(async () => {
+            const name = (job.name ?? "job").replace(/[^\w-]+/g, "-").toLowerCase();
+            save(`${name}.csv`, await csvOfJob(shown), "text/csv");
+          })}
         >
           CSV
         </Button>
@@ -101,7 +99,7 @@ export function JobView({ shown }: { shown: Opened }) {
           </button>
         ))}
         <span class="space" />
-        {counts.done > 0 && !shown.details && (
+        {lacksDetails(shown) && (
           <Button small onClick={trying(() => loadDetails(job.id))}>
             Intervals and savings
           </Button>

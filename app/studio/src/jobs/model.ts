@@ -88,7 +88,7 @@ export async function loadJob(id: string): Promise<void> {
 /**
  * Reads the whole answers of a job, one after the other, for intervals and savings. Throws Problem.
  */
-export async function loadDetails(id: string): Promise<void> {
+export async function loadDetails(id: string): Promise<Map<number, Detail>> {
   const response = await send(`jobs/${id}/results`, {});
   const reader = response.body!.pipeThrough(new TextDecoderStream()).getReader();
   const details = new Map<number, Detail>();
@@ -104,7 +104,12 @@ export async function loadDetails(id: string): Promise<void> {
   if (text.trim())
     keep(details, JSON.parse(text) as { index: number; result: Partial<Solution> | null });
   if (opened.value?.job.id === id) opened.value = { ...opened.value, details };
+  return details;
 }
+
+/** Whether moves are done whose whole answers have not been read. */
+export const lacksDetails = ({ rows, details }: Opened) =>
+  rows.some(({ index, energy }) => energy !== null && !details?.has(index));
 
 const AS_FAST = 1.05; // ratio of a way's duration to the answer's up to which it is about as fast
 
@@ -112,7 +117,8 @@ function keep(
   details: Map<number, Detail>,
   { index, result }: { index: number; result: Partial<Solution> | null },
 ): void {
-  if (!result?.energy) return;
+  if (!result) return;
+  const electrical = result.energy?.electrical;
   const kept = (result.baselines ?? []).filter(
     (each) => each.within_limits && each.saving !== null,
   );
@@ -121,10 +127,10 @@ function keep(
   const [rival] = (fast.length ? fast : kept).sort((a, b) => a.saving! - b.saving!);
   details.set(index, {
     mass: result.arm?.payload?.mass ?? null,
-    interval: result.energy.electrical.interval ?? null,
+    interval: electrical?.interval ?? null,
     rival: rival?.name ?? null,
     // in the same time: the shorter of both waits
-    rivalEnergy: rival ? result.energy.electrical.total / (1 - rival.saving!) : null,
+    rivalEnergy: rival && electrical ? electrical.total / (1 - rival.saving!) : null,
     saving: rival?.saving ?? null,
   });
 }
@@ -135,8 +141,10 @@ export const nameOf = ({ name, index }: JobRow) => name ?? `move ${index + 1}`;
 export const massOf = ({ notes, details }: Opened, { index }: JobRow) =>
   notes?.masses[index] ?? details?.get(index)?.mass ?? null;
 
-/** The table of a job as CSV. */
-export function csvOfJob(shown: Opened): string {
+/** The table of a job as CSV, with the intervals and savings of all its moves. Throws Problem. */
+export async function csvOfJob(shown: Opened): Promise<string> {
+  const details = lacksDetails(shown) ? await loadDetails(shown.job.id) : shown.details;
+  const whole = { ...shown, details };
   const quoted = (value: unknown) => {
     const text = value === null || value === undefined ? "" : String(value);
     return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
@@ -157,25 +165,19 @@ export function csvOfJob(shown: Opened): string {
     "answer",
   ];
   const lines = shown.rows.map((row) => {
-    const detail = shown.details?.get(row.index);
-    const { interval, rival, rivalEnergy, saving } = detail ?? {
-      interval: null,
-      rival: null,
-      rivalEnergy: null,
-      saving: null,
-    };
+    const detail = details?.get(row.index);
     return [
       row.index + 1,
       nameOf(row),
-      massOf(shown, row),
+      massOf(whole, row),
       row.state,
       row.duration,
       row.energy,
-      interval?.p5,
-      interval?.p95,
-      rival,
-      rivalEnergy,
-      saving,
+      detail?.interval?.p5,
+      detail?.interval?.p95,
+      detail?.rival,
+      detail?.rivalEnergy,
+      detail?.saving,
       row.problem?.detail,
       row.answer,
     ]
