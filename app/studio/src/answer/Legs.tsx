@@ -2,13 +2,21 @@ import { Section } from "../ui/Section";
 import { goTo } from "../picture/clock";
 import { legAt, legName } from "../store/cycle";
 import { answered, stale, time } from "../store/state";
+import type { Leg } from "../store/types";
 import { atMost, figure } from "../store/units";
 
 const MOST = 11; // ratio to the bound from which on a gap says nothing
 
+/** By how much a leg is at most above the least, in words; a dash where that says nothing. */
+export function gapOf(leg: Leg, objective: "electrical" | "mechanical"): string {
+  const { answer, lower_bound: bound, [objective]: needed } = leg;
+  return answer && bound > 0 && needed < MOST * bound ? atMost(needed / bound - 1) : "–";
+}
+
 /** The legs of a round, each with its own gap. */
 export function Legs() {
-  const cycle = answered.value?.cycle;
+  const shown = answered.value;
+  const cycle = shown?.cycle;
   if (!cycle) return null;
   const now = legAt(cycle.legs, time.value);
   return (
@@ -38,11 +46,7 @@ export function Legs() {
               <td>{leg.payload_mass ? figure(leg.payload_mass) : "–"}</td>
               <td>{figure(leg.duration)}</td>
               <td>{figure(leg.electrical)}</td>
-              <td>
-                {leg.answer && leg.electrical < MOST * leg.lower_bound
-                  ? atMost(leg.electrical / leg.lower_bound - 1)
-                  : "–"}
-              </td>
+              <td>{gapOf(leg, shown.solution.objective)}</td>
             </tr>
           ))}
         </tbody>

@@ -1,15 +1,23 @@
 import { goTo } from "../picture/clock";
 import { legAt, legName } from "../store/cycle";
 import { time, type CycleShown } from "../store/state";
+import type { Leg } from "../store/types";
 import { figure } from "../store/units";
 
 const FITS = 22; // height from which on the joules fit into a leg [%]
 
+const LEAST = 8; // height of a leg that needs next to nothing [%]
+
+/** Heights of legs [%], in proportion to their mean powers; of legs that give energy, the least. */
+export function heightsOf(legs: Pick<Leg, "electrical" | "duration">[]): number[] {
+  const powers = legs.map(({ electrical, duration }) => electrical / (duration || Infinity));
+  const most = Math.max(...powers);
+  return powers.map((power) => Math.max(LEAST, most > 0 ? (100 * power) / most : 0));
+}
+
 /** Legs as wide as their time and as high as their mean power; the figures are joules. */
 export function LegTimeline({ cycle: { legs, loads } }: { cycle: CycleShown }) {
-  const most = Math.max(
-    ...legs.map(({ electrical, duration }) => electrical / (duration || Infinity)),
-  );
+  const heights = heightsOf(legs);
   const now = legAt(legs, time.value);
   return (
     <div class="timeline" id="timeline">
@@ -17,7 +25,7 @@ export function LegTimeline({ cycle: { legs, loads } }: { cycle: CycleShown }) {
       <div class="legs" role="group" aria-label="Legs of the round">
         {legs.map((leg, k) => {
           const text = `${legName(leg)}: ${figure(leg.duration)} s, ${figure(leg.electrical)} J, ${figure(leg.payload_mass)} kg`;
-          const height = (100 * leg.electrical) / (leg.duration || 1) / most;
+          const height = heights[k]!;
           const kind = leg.answer ? (loads[k]?.payload ? "loaded" : "unloaded") : "rest";
           return (
             <button
@@ -27,7 +35,7 @@ export function LegTimeline({ cycle: { legs, loads } }: { cycle: CycleShown }) {
               title={text}
               aria-label={text}
               data-now={k === now ? "" : undefined}
-              style={{ flexGrow: leg.duration, height: `${Math.max(8, height)}%` }}
+              style={{ flexGrow: leg.duration, height: `${height}%` }}
               onClick={() => goTo(leg.t0)}
             >
               <span>{leg.answer && height > FITS ? figure(leg.electrical) : ""}</span>

@@ -170,6 +170,7 @@ export interface Leg {
   t0: number;
   duration: number;
   electrical: number;
+  mechanical: number;
   lower_bound: number;
   payload_mass: number;
   answer: string | null;
