@@ -8,6 +8,7 @@ import {
   withObstacle,
   withoutRow,
   withRobot,
+  withSpeed,
   withStop,
 } from "../src/store/edits";
 import { extentOf } from "../src/picture/shapes";
@@ -188,6 +189,18 @@ it("a robot starts with its own example move, unless joints were given that it c
     withRobot({ robot: "first", ...of(start, goal) }, second, first);
   expect(taken([0, 1], [1, 1])).toEqual({ robot: "second", ...of([0, -1], [2, -1]) });
   expect(taken([0.5, -2], [0.5, 2])).toEqual({ robot: "second", ...of([0.5, -2], [2, -1]) });
+});
+
+it("a held speed of the TCP is its least one too, and keeps its ramps", () => {
+  const path = asKind(MOVE, "path");
+  const speedOf = (asked: ApiRequest) => at(asked, "/path/speed");
+  const limited = withSpeed(path, 0.1, false);
+  expect(speedOf(limited)).toBe(0.1);
+  const held = put(withSpeed(limited, 0.1, true), "/path/speed/ramp", 0.03);
+  expect(speedOf(held)).toEqual({ min: 0.1, max: 0.1, ramp: 0.03 });
+  expect(speedOf(withSpeed(held, 0.2, true))).toEqual({ min: 0.2, max: 0.2, ramp: 0.03 });
+  expect(speedOf(withSpeed(held, 0.2, false))).toBe(0.2);
+  expect(at(withSpeed(held, undefined, false), "/path")).toEqual({});
 });
 
 it("another kind of time begins with the seconds of before", () => {

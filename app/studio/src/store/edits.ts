@@ -91,6 +91,16 @@ const isWithin = (robot: Robot, q: number[]) =>
 
 const middleOf = (robot: Robot) => limitsOf(robot).map(([low, high]) => (low + high) / 2);
 
+/**
+ * The request with a largest speed of the TCP along its path [m/s]; a held one is the least speed,
+ * too, and keeps its ramps.
+ */
+export function withSpeed(request: ApiRequest, most: number | undefined, held: boolean) {
+  const given = at(request, "/path/speed");
+  const speed = held ? { ...(isObject(given) ? given : {}), min: most, max: most } : most;
+  return put(request, "/path/speed", speed);
+}
+
 const namesOf = (stops: Stop[]) => stops.map((stop, k) => stop?.name ?? `${k + 1}`);
 
 /**

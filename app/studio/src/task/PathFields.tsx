@@ -2,9 +2,10 @@ import { Errors } from "../ui/Errors";
 import { NumberCell } from "../ui/NumberCell";
 import { Section } from "../ui/Section";
 import { Segment } from "../ui/Segment";
+import { withSpeed } from "../store/edits";
 import { at, put } from "../store/pointer";
 import { isObject } from "../store/request";
-import { edit, request, write } from "../store/state";
+import { edit, request, typed } from "../store/state";
 
 const SHAPES = [
   { value: "lines", text: "Lines" },
@@ -52,10 +53,12 @@ function Speed() {
   const given = at(request.value, "/path/speed") ?? undefined;
   const most = isObject(given) ? given.max : given;
   const held = isObject(given) && given.min === most;
+  const pointer = held ? "/path/speed/max" : "/path/speed";
   const set = (value: number | undefined, fixed: boolean, text?: string) =>
-    fixed
-      ? write("/path/speed", { ...(isObject(given) ? given : {}), min: value, max: value })
-      : write("/path/speed", value, text);
+    edit(
+      withSpeed(request.value, value, fixed),
+      text === undefined ? typed.value : { ...typed.value, [pointer]: text },
+    );
   if (given !== undefined && (typeof most !== "number" || (isObject(given) && !held)))
     return <p class="hint">TCP speed: as in JSON</p>;
   return (
@@ -73,7 +76,7 @@ function Speed() {
         ) : (
           <NumberCell
             label="TCP speed"
-            pointer={held ? "/path/speed/max" : "/path/speed"}
+            pointer={pointer}
             value={most}
             unit="mmps"
             onValue={(value, text) => set(value, held, text)}
