@@ -2,6 +2,7 @@ import { useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { useDraft } from "../ui/draft";
 import { Menu } from "../ui/Menu";
+import { projectName } from "../store/persist";
 import { robotName } from "../store/request";
 import { examples } from "../store/service";
 import { project, request } from "../store/state";
@@ -31,7 +32,7 @@ export function ProjectMenu() {
         aria-label="Name of the project"
         {...field}
         onChange={(event) =>
-          (project.value = { ...project.value, name: event.currentTarget.value || "Untitled cell" })
+          (project.value = { ...project.value, name: projectName(event.currentTarget.value) })
         }
       />
       <Menu label="" name="Project" icon="down" quiet id="project">

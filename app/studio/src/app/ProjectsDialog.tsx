@@ -32,8 +32,8 @@ export function ProjectsDialog({ onClose }: { onClose: () => void }) {
   };
   const rename = async (each: Saved, name: string | null) => {
     if (!name) return;
-    await renameProject(each, name);
-    setAll((all ?? []).map((one) => (one === each ? { ...each, name } : one)));
+    const kept = await renameProject(each, name);
+    setAll((all ?? []).map((one) => (one === each ? { ...each, name: kept } : one)));
   };
   const drop = async (each: Saved) => {
     await deleteProject(each.id);

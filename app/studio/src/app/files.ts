@@ -1,13 +1,13 @@
 // Projects as files.
 import { newId } from "../store/persist";
-import { cellOf, presentCell, save } from "../store/share";
+import { cellOf, fileName, presentCell, save } from "../store/share";
 import { page, project, replaceCell, toast } from "../store/state";
 import { tell } from "../store/trouble";
 
 /** Saves the project as a file. */
 export function saveFile(): void {
-  const name = project.value.name.replace(/[^\w.-]+/g, "-").toLowerCase() || "cell";
-  save(`${name}.joulepath.json`, JSON.stringify(presentCell(), null, 1), "application/json");
+  const name = fileName(project.value.name, "cell", "joulepath.json");
+  save(name, JSON.stringify(presentCell(), null, 1), "application/json");
   toast.value = "The project is saved as a file.";
 }
 

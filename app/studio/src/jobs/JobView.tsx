@@ -5,7 +5,7 @@ import { openCell, openKept } from "../store/open";
 import { baselineName } from "../store/facts";
 import { post } from "../store/client";
 import { costsFor, report, type ReportFormat } from "../store/report";
-import { save } from "../store/share";
+import { fileName, save } from "../store/share";
 import { economics } from "../store/state";
 import { trying } from "../store/trouble";
 import { asShown, figure, percent } from "../store/units";
@@ -58,8 +58,7 @@ export function JobView({ shown }: { shown: Opened }) {
           icon="file"
           id="job-csv"
           onClick={trying(async () => {
-            const name = (job.name ?? "job").replace(/[^\w-]+/g, "-").toLowerCase();
-            save(`${name}.csv`, await csvOfJob(shown), "text/csv");
+            save(fileName(job.name ?? "", "job", "csv"), await csvOfJob(shown), "text/csv");
           })}
         >
           CSV

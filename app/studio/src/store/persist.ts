@@ -61,10 +61,15 @@ export async function projects(): Promise<Saved[]> {
 export const deleteProject = (id: string) =>
   within("projects", "readwrite", (store) => store.delete(id));
 
+/** The name of a project as it is kept: without spaces around it, and never empty. */
+export const projectName = (typed: string) => typed.trim() || "Untitled cell";
+
 /** Gives a project of this browser another name. */
-export async function renameProject(record: Saved, name: string): Promise<void> {
+export async function renameProject(record: Saved, typed: string): Promise<string> {
+  const name = projectName(typed);
   if (record.id === project.value.id) project.value = { ...project.value, name };
   else await write({ ...record, name });
+  return name;
 }
 
 /** What was asked when an answer was computed here; null for answers of others. */

@@ -5,7 +5,7 @@ import { costsOf, DEFAULT_ECONOMICS, type Economics } from "./economics";
 import { periodOf } from "./facts";
 import { mapShown } from "./placement";
 import { endpointOf } from "./request";
-import { save } from "./share";
+import { fileName, save } from "./share";
 import { answered, economics, project } from "./state";
 import { said } from "./trouble";
 
@@ -69,8 +69,7 @@ export interface Report {
   dismiss: () => void;
 }
 
-export const fileOf = ({ title, format }: Report) =>
-  `${title.replace(/[^\w-]+/g, "-").toLowerCase() || "report"}.${format}`;
+export const fileOf = ({ title, format }: Report) => fileName(title, "report", format);
 
 /** Writes a report, and saves it as a file; `reports` tells how far it is. */
 export async function report(

@@ -101,6 +101,12 @@ export function csvOf({ t, q, v, a, tau, tau_motor, power }: import("./types").T
   return [head.join(","), ...lines, ""].join("\n");
 }
 
+/** A name of a file in small letters of any language, from what people call its content. */
+export function fileName(title: string, otherwise: string, ending: string): string {
+  const name = title.toLowerCase().replace(/[^\p{L}\p{M}\p{N}_.]+/gu, "-");
+  return `${name.replace(/^[-.]+|[-.]+$/g, "") || otherwise}.${ending}`;
+}
+
 /** Offers a text or blob as a file. */
 export function save(
   name: string,
