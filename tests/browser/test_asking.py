@@ -266,7 +266,7 @@ def test_another_robot_begins_with_a_move_of_its_own(browser: Browser, service: 
         search = page.get_by_role("combobox", name="Search robots")
         expect(search).to_be_focused()
         page.keyboard.type("kuka")
-        chosen = page.get_by_role("listbox", name="Search robots").locator("[aria-selected=true]")
+        chosen = page.get_by_role("listbox", name="Robots").locator("[aria-selected=true]")
         expect(chosen).to_contain_text("iiwa")
         page.keyboard.press("ArrowDown")
         expect(chosen).to_contain_text("KR 10")

@@ -184,7 +184,8 @@ def test_a_researcher_brings_an_own_arm(browser: Browser, service: Server, tmp_p
         page.get_by_label("Largest payload, kg").fill("2")
         page.get_by_role("button", name="Add the arm").click()
         until(page, "() => studio.state.request.robot === 'two_joints'")
-        assert state(page, "request.start.q") == [0, 0], "two joints, within their ranges"
+        move = service.get("/robots/two_joints").json()["example_move"]
+        assert state(page, "request.start.q") == move["start"]
         page.locator("[data-row='/start']").get_by_label("More for Start").click()
         page.get_by_role("button", name="Joint sliders").click()
         page.get_by_role("slider", name="elbow").fill("1")

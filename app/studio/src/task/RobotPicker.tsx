@@ -56,7 +56,13 @@ export function RobotPicker({ onClose }: { onClose: () => void }) {
           )}
           {!robots && !why && <p class="hint">…</p>}
           {robots && (
-            <Choices label="Search robots" choices={choices} current={now} onChoose={choose} />
+            <Choices
+              label="Search robots"
+              name="Robots"
+              choices={choices}
+              current={now}
+              onChoose={choose}
+            />
           )}
         </>
       )}

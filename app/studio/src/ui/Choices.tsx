@@ -8,7 +8,10 @@ export interface Choice {
 }
 
 interface Props {
+  /** Of the search field. */
   label: string;
+  /** Of the list. */
+  name: string;
   choices: Choice[];
   current: string;
   onChoose: (value: string) => void;
@@ -33,7 +36,7 @@ export function ledTo(key: string, index: number, count: number): number | null 
  * A search field over the list that it filters: ARIA's combobox, whose list is always open. Arrows
  * move the highlight, Enter takes what is highlighted.
  */
-export function Choices({ label, choices, current, onChoose }: Props) {
+export function Choices({ label, name, choices, current, onChoose }: Props) {
   const [text, setText] = useState("");
   const shown = found(choices, text);
   const first = text ? 0 : shown.findIndex(({ value }) => value === current);
@@ -77,7 +80,7 @@ export function Choices({ label, choices, current, onChoose }: Props) {
       <p class="hint" role="status">
         {shown.length ? "" : "None has this name."}
       </p>
-      <ul class="choices" role="listbox" id={id} aria-label={label} ref={list}>
+      <ul class="choices" role="listbox" id={id} aria-label={name} ref={list}>
         {shown.map(({ value, title, facts, note }, k) => (
           <li
             key={value}
