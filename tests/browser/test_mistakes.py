@@ -82,7 +82,12 @@ def test_without_the_service_nothing_is_lost(browser: Browser, service: Server) 
         expect(page.locator("#problem")).to_contain_text("Your work is saved here")
         expect(page.locator("#problem")).to_contain_text("The service does not answer")
         expect(page.locator("#saved")).to_have_text("Saved in this browser")
+        go(page, "Jobs")
+        expect(page.locator("#jobs .error")).to_contain_text("The service does not answer")
         page.context.set_offline(False)
+        # the list comes by itself
+        expect(page.locator("#jobs .error")).to_have_count(0)
+        go(page, "Cell")
         optimised(page)
         assert state(page, "answered.asked.payload.mass") == 1.6
         expect(page.locator("#problem")).to_have_count(0)

@@ -23,9 +23,16 @@ export function JobsPage() {
     };
     look().catch((error) => tell(error));
     const timer = setInterval(() => {
-      const busy =
-        jobs.peek()?.some((job) => !isOver(job)) || (opened.peek() && !isOver(opened.peek()!.job));
-      if (busy) look().catch(() => undefined);
+      const known = jobs.peek();
+      const now = opened.peek();
+      // a list that never came is asked for until the service answers
+      if (!known)
+        look().then(
+          () => (trouble.value = null),
+          () => undefined,
+        );
+      else if (known.some((job) => !isOver(job)) || (now && !isOver(now.job)))
+        look().catch(() => undefined);
     }, PAUSE);
     return () => clearInterval(timer);
   }, []);
