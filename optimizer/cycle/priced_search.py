@@ -103,7 +103,7 @@ class PricedPair:
         self.leg, self.s, self.g, self.longest, self.deadline = leg, s, g, longest, deadline
         self.known = known
 
-    def at(self, price: float) -> PricedMotion:
+    def __call__(self, price: float) -> PricedMotion:
         """Motion of least objective + price · duration, among the found and the known ones.
 
         A solve starts from the best known motion and may still end in a worse one: where motions

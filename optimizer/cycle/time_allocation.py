@@ -8,7 +8,7 @@ only if a further second saves less than waiting costs, or hardly more, for ever
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -55,17 +55,9 @@ class Motion(Protocol):
         ...
 
 
-class PricedMove(Protocol):
-    """A move between two rests."""
-
-    def at(self, price: float) -> Motion:
-        """Motion of least energy + price · duration.
-
-        Raises:
-            NoTrajectory: no motion is found.
-            DeadlineExceeded: the time is up.
-        """
-        ...
+PricedMove = Callable[[float], Motion]
+"""A move between two rests: its motion of least energy + price · duration, by the price [W]. Raises
+NoTrajectory without a motion, and DeadlineExceeded if the time is up."""
 
 
 @dataclass(frozen=True)
@@ -117,10 +109,13 @@ class TimeAllocation:
             NoTrajectory: a move has no motion.
             DeadlineExceeded: the time is up.
         """
-        return Allocation.of(price, [move.at(price) for move in self.moves])
+        return Allocation.of(price, [move(price) for move in self.moves])
 
     def allocate(self, time: float, waiting: float, fastest: Sequence[Motion]) -> Allocation:
         """Moves and a wait of least energy, in exactly the given time.
+
+        Mechanical work needs no power for a wait. Every further second then saves work, but less
+        and less, and the rest of the time is waited out below `least_price`.
 
         Args:
             time: total time [s].
@@ -131,62 +126,25 @@ class TimeAllocation:
             NoTrajectory: a move has no motion.
             DeadlineExceeded: the time is up.
         """
-        slow = self.at(-waiting * (1 - ALLOCATION.worth_slowing))
-        if slow.moving_time <= time:
-            return Allocation(
-                -waiting, slow.durations, slow.energy, time - slow.moving_time, slow.tangent(time)
-            )
+        lowest = -waiting * (1 - ALLOCATION.worth_slowing) if waiting else ALLOCATION.least_price
+        found = self.at(lowest if waiting else _first_price(fastest, time))
+        while found.moving_time <= time:
+            if found.price <= lowest:
+                waited, least = time - found.moving_time, found.tangent(time)
+                return Allocation(0.0 - waiting, found.durations, found.energy, waited, least)
+            fast, found = found, self.at(max(found.price / ALLOCATION.price_factor, lowest))
+            if found.moving_time > time:
+                return self._between_prices(found, fast, time)
         for price in ALLOCATION.prices:
-            fast = self.at(price)
-            if fast.moving_time <= time:
-                return self._between_prices(slow, fast, time)
-            slow = fast
+            if price > found.price:
+                slow, found = found, self.at(price)
+                if found.moving_time <= time:
+                    return self._between_prices(slow, found, time)
         # the fastest moves are optimal at no price, so only the slow ones give a tangent
         return replace(
-            _interpolated(slow, Allocation.of(ALLOCATION.prices[-1], fastest), time),
-            least=slow.tangent(time),
+            _interpolated(found, Allocation.of(ALLOCATION.prices[-1], fastest), time),
+            least=found.tangent(time),
         )
-
-    def allocate_for_work(self, time: float, fastest: Sequence[Motion]) -> Allocation:
-        """Moves of least mechanical work within the given time [s]; rests do no work.
-
-        Every further second saves work, but less and less. The work of acceleration is proportional
-        to the inverse square of the duration, which gives the first price.
-
-        Args:
-            time: total time [s].
-            fastest: fastest motions of all moves, together no longer than the time.
-
-        Raises:
-            NoTrajectory: a move has no motion.
-            DeadlineExceeded: the time is up.
-        """
-        fast = Allocation.of(ALLOCATION.prices[-1], fastest)
-        price = np.clip(
-            2 * fast.energy / fast.moving_time * (fast.moving_time / time) ** 3,
-            ALLOCATION.least_price,
-            ALLOCATION.prices[-1],
-        )
-        found = self.at(float(price))
-        if found.moving_time <= time:
-            while found.moving_time <= time:
-                if found.price <= ALLOCATION.least_price:
-                    return Allocation(
-                        0.0, found.durations, found.energy, time - found.moving_time, found.energy
-                    )
-                fast, found = (
-                    found,
-                    self.at(max(found.price / ALLOCATION.price_factor, ALLOCATION.least_price)),
-                )
-            return self._between_prices(found, fast, time)
-        while found.price < ALLOCATION.prices[-1]:
-            slow, found = (
-                found,
-                self.at(min(found.price * ALLOCATION.price_factor, ALLOCATION.prices[-1])),
-            )
-            if found.moving_time <= time:
-                return self._between_prices(slow, found, time)
-        return _interpolated(found, fast, time)
 
     def _between_prices(self, slow: Allocation, fast: Allocation, time: float) -> Allocation:
         """Moves at a price between those of too slow and fast enough moves, by the Illinois
@@ -209,6 +167,15 @@ class TimeAllocation:
             else:
                 fast, below, above = middle, middle.moving_time - time, above / 2
         return _interpolated(slow, fast, time)
+
+
+def _first_price(fastest: Sequence[Motion], time: float) -> float:
+    """Price [W] near that of the given time [s] for work alone: the work of acceleration is
+    proportional to the inverse square of the duration.
+    """
+    energy, shortest = total_energy(fastest), total_duration(fastest)
+    price = 2 * energy * shortest**2 / time**3
+    return float(np.clip(price, ALLOCATION.least_price, ALLOCATION.prices[-1]))
 
 
 def total_duration(motions: Sequence[Motion]) -> float:

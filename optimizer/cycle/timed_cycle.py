@@ -272,11 +272,8 @@ class TimedSearch:
             ]
         )
         try:
-            if self._rests_count:
-                waiting = min(self.waiting_power(nodes, k) for k in self._before_wait)
-                allocation = moves.allocate(self.time, waiting, fast)
-            else:
-                allocation = moves.allocate_for_work(self.time, fast)
+            waiting = min(self.waiting_power(nodes, k) for k in self._before_wait)
+            allocation = moves.allocate(self.time, waiting, fast)
         except NoTrajectory:
             return None
         wait_after, wait = self.cheapest_wait(nodes, allocation.waited)

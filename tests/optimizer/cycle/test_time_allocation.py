@@ -47,7 +47,7 @@ class Move:
         """Energy of the move [J]."""
         return self.swing / self.duration**2 + self.drawn * self.duration - self.gained
 
-    def at(self, price: float) -> Move:
+    def __call__(self, price: float) -> Move:
         """The move in the duration of least energy + price · duration."""
         slope = self.drawn + price
         best = (2 * self.swing / slope) ** (1 / 3) if slope > 0 else np.inf
@@ -162,7 +162,7 @@ def test_where_the_durations_jump_the_best_is_not_known() -> None:
     class Jumping(Move):
         """A move with a fast and a slow speed only, and so with a nonconvex energy."""
 
-        def at(self, price: float) -> Jumping:
+        def __call__(self, price: float) -> Jumping:
             """The better of the two."""
             ends = [replace(self, duration=self.shortest), replace(self, duration=self.longest)]
             return min(ends, key=lambda each: each.energy + price * each.duration)
@@ -196,10 +196,10 @@ def test_a_solve_that_ends_in_a_worse_motion_changes_nothing(
 ) -> None:
     own, worse, best = motion(1.0, 10.0), motion(3.0, 60.0), motion(2.0, 15.0)
     found = move(monkeypatch, [own], worse, best, worse)
-    assert found.at(-8.0) is own
-    assert found.at(-8.0) is best
+    assert found(-8.0) is own
+    assert found(-8.0) is best
     # at another price, one from before is the best again
-    assert found.at(20.0) is own
+    assert found(20.0) is own
 
 
 def test_a_motion_that_lasts_longer_than_allowed_is_only_where_a_solve_begins(
@@ -211,7 +211,7 @@ def test_a_motion_that_lasts_longer_than_allowed_is_only_where_a_solve_begins(
     monkeypatch.setattr(
         priced_search, "priced_motion", lambda *given: begun.append(given[-1]) or solved
     )
-    assert found.at(-10.0) is solved
+    assert found(-10.0) is solved
     assert begun == [long.spline]
 
 
@@ -219,6 +219,6 @@ def test_where_a_solve_from_a_motion_fails_one_from_none_is_tried(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     own, other = motion(1.0, 10.0), motion(2.0, 1.0)
-    assert move(monkeypatch, [own], None, other).at(0.0) is other
+    assert move(monkeypatch, [own], None, other)(0.0) is other
     with pytest.raises(NoTrajectory):
-        move(monkeypatch, [own], None, None).at(0.0)
+        move(monkeypatch, [own], None, None)(0.0)
