@@ -201,19 +201,24 @@ class _Evaluator:
         assert self._last is not None  # motions without a block are refused
         whole = self._with_interval(join_intervals([*self._intervals.values()]), self._sensitivity)
         listed = self._segment_count <= MOTION_LIMITS.max_segments
+        limits = self._limits.report()
+        nearest = None if self._clearance is None else self._clearance.nearest
         return Evaluation(
+            duration=whole.duration,
             total=whole,
             segments=[self._part(k, k + 1) for k in self._intervals] if listed else [],
             cycles=[self._part(*ends) for ends in pairwise(self._cycles)] if listed else [],
             segment_count=self._segment_count,
             speed_jumps=self._speed_jumps,
-            limits=self._limits.report(),
+            within_limits=all(each.held for each in limits),
+            limits=limits,
             samples=None
             if self._sampler is None
             else self._sampler.finish(self._last, self._charge),
-            nearest=None if self._clearance is None else self._clearance.nearest,
+            collides=None if nearest is None else nearest.distance < 0,
+            nearest=nearest,
             close_pass=None if self._clearance is None else self._clearance.close_pass,
-            unmodelled=[] if self._clearance is None else self._clearance.unmodelled,
+            unmodelled=() if self._clearance is None else self._clearance.unmodelled,
         )
 
     def _part(self, first: int, end: int) -> IntervalEnergy:

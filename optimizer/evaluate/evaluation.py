@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
-from joulepath.optimizer.declared import Count, Seconds
+from joulepath.optimizer.declared import Count, Internal, Seconds
 from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy
 from joulepath.optimizer.evaluate.limit_report import LimitReport
 from joulepath.optimizer.evaluate.nearest_contact import LeastClearance
@@ -47,63 +47,33 @@ class EvaluatedMotion:
     """Smallest clearance at sample points; null if `collisions` is false."""
     samples: Samples | None
     """Samples of the motion; null without `sample_period`."""
+    close_pass: Annotated[LeastClearance | None, Internal] = None
+    """Least distance without margins; None unless it is below 2 mm."""
+    unmodelled: Annotated[Sequence[Clearance], Internal] = ()
+    """As in `Solution`."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Evaluation(Result):
-    """Energy of a given motion, and its use of the limits.
-
-    Attributes:
-        segments: energy of the segments; empty if there are more than 10,000.
-        cycles: energy of the cycles in a log of a repeated motion; empty for other motions.
-        speed_jumps: number of velocity steps inside the motion.
-        nearest: least clearance with margins subtracted; None if collisions are not checked.
-        close_pass: least distance without margins; None unless it is below 2 mm.
-        unmodelled: as in `Solution`.
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Evaluation(Result, EvaluatedMotion):
+    """Energy of a given motion, and its use of the limits: the fields of an answer of the
+    service.
     """
-
-    total: IntervalEnergy
-    segments: list[IntervalEnergy]
-    cycles: list[IntervalEnergy]
-    segment_count: int
-    speed_jumps: int
-    limits: list[LimitReport]
-    samples: Samples | None
-    nearest: LeastClearance | None
-    close_pass: LeastClearance | None
-    unmodelled: list[Clearance]
-
-    def evaluated_motion(self) -> EvaluatedMotion:
-        """The fields of an answer of the service."""
-        return EvaluatedMotion(
-            duration=self.total.duration,
-            total=self.total,
-            segments=self.segments,
-            cycles=self.cycles,
-            segment_count=self.segment_count,
-            speed_jumps=self.speed_jumps,
-            within_limits=all(report.held for report in self.limits),
-            limits=self.limits,
-            collides=None if self.nearest is None else self.nearest.distance < 0,
-            nearest=self.nearest,
-            samples=self.samples,
-        )
 
     def _headline(self) -> str:
         energy = self.total.energy
         broken = [each.limit for each in self.limits if not each.held]
         return (
             f"{energy_text(energy, 'electrical')}, {energy_text(energy, 'mechanical')}, "
-            f"{self.total.duration:.4g} s, "
+            f"{self.duration:.4g} s, "
             + (f"breaks {', '.join(broken)}" if broken else "within the limits")
-            + (", collides" if self.evaluated_motion().collides else "")
+            + (", collides" if self.collides else "")
         )
 
     def _rows(self) -> Rows:
         return energy_rows(self.total.energy)
 
     def _shown(self) -> Any:
-        return self.evaluated_motion()
+        return self
 
     def _columns(self) -> dict[str, Any]:
         """One row per segment; one row for the whole motion if there are too many segments."""

@@ -25,6 +25,7 @@ from joulepath.optimizer.placement.placement_solution import (
 from joulepath.optimizer.placement.region import Coordinate, Group, Moved, Places, Region
 from joulepath.optimizer.placement.rounds import Round
 from joulepath.optimizer.placement.space import Place, Space
+from joulepath.optimizer.presentation.gap import optimality_gap
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.progress import Tell, no_listener, only_news
@@ -110,16 +111,18 @@ def _moved(
 
 def _solution(search: PlacementSearch, wall_time: float) -> PlacementSolution:
     space, best, nominal = search.space, search.best, search.nominal
-    assert best is not None
-    left_out = search.left_out
+    assert best is not None and best.energy is not None
+    left_out, bound, before = search.left_out, search.lower_bound, nominal.energy or 0.0
     return PlacementSolution(
         best=_placed(search, best),
         nominal=None if nominal.energy is None else _placed(search, nominal),
         nominal_reason=nominal.reason,
+        saving=1 - best.energy / before if before > 0 else None,
+        optimality_gap=None if bound is None else optimality_gap(bound, best.energy),
         map=[_point(space, each) for each in search.map],
         resolution=search.space.resolution,
         tolerance=_tolerance(search),
-        lower_bound=search.lower_bound,
+        lower_bound=bound,
         status="complete" if search.is_refined and not left_out else "cut_short",
         evaluated=search.evaluated,
         left_out=left_out,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,7 +13,6 @@ from joulepath.optimizer.declared import Count, Internal, Joules, Metres, Ratio,
 from joulepath.optimizer.placement.region import Coordinate, Mount
 from joulepath.optimizer.placement.rounds import Reason
 from joulepath.optimizer.presentation.chart import Chart
-from joulepath.optimizer.presentation.gap import optimality_gap
 from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.result.energy import Objective
@@ -130,63 +129,13 @@ class SolvedPlacement:
     """Number of places of the map for which there was no time."""
     wall_time: Seconds
     """Wall time of the search."""
+    edges: Annotated[Sequence[Coordinate], Internal] = ()
+    """Coordinates of the best place that are at an end of their range."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class PlacementSolution(Result):
-    """The placement of least energy.
-
-    Attributes:
-        best: place of least energy, with its cycles.
-        nominal: nominal place; None where its cycles cannot be run, for `nominal_reason`.
-        nominal_reason: why the nominal place has no cycles.
-        map: places of the map, in the order of the axes.
-        resolution: largest distance between neighbouring places of the map [m]; None of listed
-            places.
-        tolerance: how precisely every free coordinate must be kept; empty if there was no time.
-        lower_bound: lower bound of the objective at every place of the region [J]; None where none
-            is known.
-        status: "complete" if every place of the map was decided and the refinement ended;
-            "cut_short" if the deadline came first.
-        evaluated: number of places whose cycles were computed or estimated, beyond the map, too.
-        left_out: number of places of the map for which there was no time.
-        wall_time: wall time [s].
-        objective: the minimised energy.
-        edges: coordinates of the best place that are at an end of their range.
-    """
-
-    best: PlacedRound
-    nominal: PlacedRound | None
-    nominal_reason: Reason | None
-    map: list[MapPoint]
-    resolution: float | None
-    tolerance: list[Tolerance]
-    lower_bound: float | None
-    status: PlacementStatus
-    evaluated: int
-    left_out: int
-    wall_time: float
-    objective: Objective
-    edges: Sequence[Coordinate] = ()
-
-    @property
-    def saving(self) -> float | None:
-        """1 - energy of the best place / energy of the nominal one; None without the latter."""
-        if self.nominal is None or self.nominal.energy <= 0:
-            return None
-        return 1 - self.best.energy / self.nominal.energy
-
-    @property
-    def optimality_gap(self) -> float | None:
-        """Energy of the best place / lower bound - 1; None without a positive bound."""
-        if self.lower_bound is None:
-            return None
-        return optimality_gap(self.lower_bound, self.best.energy)
-
-    def solved_placement(self) -> SolvedPlacement:
-        """The fields of an answer of the service."""
-        own = {each.name for each in fields(SolvedPlacement)}
-        return SolvedPlacement(**{name: getattr(self, name) for name in own})
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class PlacementSolution(Result, SolvedPlacement):
+    """The placement of least energy, with the fields of an answer of the service."""
 
     def _headline(self) -> str:
         saved = "" if self.saving is None else f", {self.saving:.1%} less than the nominal place"
@@ -211,7 +160,7 @@ class PlacementSolution(Result):
         return [("place", "x [m]", "y [m]", "z [m]", "energy [J]", "duration [s]"), *rows]
 
     def _shown(self) -> Any:
-        return self.solved_placement()
+        return self
 
     def _columns(self) -> dict[str, Any]:
         """One row per place of the map."""

@@ -133,7 +133,7 @@ class EvaluateAnswer(EvaluatedMotion, MotionAnswer):
     def of(cls, request_id: str, found: Evaluated) -> Self:
         """The answer for the motion of the arm asked about."""
         asked, result = found.asked, found.result
-        motion = vars(result.evaluated_motion()) | {
+        motion = vars(result) | {
             "total": found.total,
             "segments": found.segments,
             "cycles": found.cycles,

@@ -88,7 +88,7 @@ class PlacementTask:
             request=self.request_id,
             robot=self.request.robot,
             warnings=_warnings(self.request, found),
-            **vars(found.solved_placement()) | {"best": best, "nominal": nominal},
+            **vars(found) | {"best": best, "nominal": nominal},
         )
         stored, asked = collector.stored, sent(self.request)
         return TaskResult.of_kept_json(answer, answer.figures, stored, asked)
