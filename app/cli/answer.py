@@ -120,7 +120,7 @@ def compile_kernel_of(robot_name: str) -> None:
 
     settings = replace(CACHE, compiler_timeout=CACHE.command_timeout)
     try:
-        with terminal.progress("Equations of motion (compiled once per robot)"):
+        with terminal.steps("Equations of motion (compiled once per robot)"):
             compile_kernel(robot_named(robot_name), settings=settings)
     except (UnknownRobot, StoreUnavailable):
         return  # the answer reports this error

@@ -63,7 +63,7 @@ def export(
         ),
     )
     request = validated(ExportRequest, body, request_id)
-    with terminal.progress("Certifying the motion"):
+    with terminal.steps("Certifying the motion"):
         result = result_of(ExportTask(request, format, False, request_id), DEADLINE, request_id)
     write(result.document, output)
     assert isinstance(result, ExportResult)

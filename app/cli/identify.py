@@ -43,47 +43,6 @@ class _Json(click.ParamType[dict[str, Any], Any]):
         return content
 
 
-JSON = _Json()
-OTHERS = click.option(
-    "--validate",
-    "others",
-    multiple=True,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="A log that validates the figures, and that no fit sees. May be repeated. Default: a "
-    "third of the motions.",
-)
-FIT = click.option(
-    "--fit",
-    multiple=True,
-    type=click.Choice(get_args(Target)),
-    default=("friction", "rotor"),
-    show_default=True,
-    help="What is found. May be repeated. Power is added where the logs have it; payload is that "
-    "of the last log.",
-)
-METHOD = click.option(
-    "--method",
-    type=click.Choice(get_args(Method)),
-    default="automatic",
-    show_default=True,
-    help="How it is found; docs/reference/identification.md says what each method needs.",
-)
-PERIOD = click.option(
-    "--period",
-    type=click.FloatRange(0.1, 1e4),
-    help="Period of the motion [s], for --method periodic.",
-)
-TERMS = click.option(
-    "--term",
-    "terms",
-    multiple=True,
-    type=click.Choice(get_args(Term)),
-    default=DEFAULT_TERMS,
-    show_default=True,
-    help="A term of the friction law. May be repeated.",
-)
-
-
 @click.command(
     epilog="""\b
 Examples:
@@ -98,11 +57,44 @@ Examples:
 )
 @OUTPUT
 @click.option("--robot", default="ur5e", show_default=True, help="Name of the robot.")
-@OTHERS
-@FIT
-@METHOD
-@PERIOD
-@TERMS
+@click.option(
+    "--validate",
+    "others",
+    multiple=True,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="A log that validates the figures, and that no fit sees. May be repeated. Default: a "
+    "third of the motions.",
+)
+@click.option(
+    "--fit",
+    multiple=True,
+    type=click.Choice(get_args(Target)),
+    default=("friction", "rotor"),
+    show_default=True,
+    help="What is found. May be repeated. Power is added where the logs have it; payload is that "
+    "of the last log.",
+)
+@click.option(
+    "--method",
+    type=click.Choice(get_args(Method)),
+    default="automatic",
+    show_default=True,
+    help="How it is found; docs/reference/identification.md says what each method needs.",
+)
+@click.option(
+    "--period",
+    type=click.FloatRange(0.1, 1e4),
+    help="Period of the motion [s], for --method periodic.",
+)
+@click.option(
+    "--term",
+    "terms",
+    multiple=True,
+    type=click.Choice(get_args(Term)),
+    default=DEFAULT_TERMS,
+    show_default=True,
+    help="A term of the friction law. May be repeated.",
+)
 @click.option(
     "--refit/--keep",
     default=None,
@@ -134,7 +126,7 @@ Examples:
 )
 @click.option(
     "--columns",
-    type=JSON,
+    type=_Json(),
     help="Names of the columns, or their numbers from 1, as JSON: "
     """'{"time": 1, "q": [2, 3, 4, 5, 6, 7]}'.""",
 )

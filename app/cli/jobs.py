@@ -12,7 +12,7 @@ import orjson
 from joulepath.app.cli.answer import FILE, OUTPUT, write
 from joulepath.app.cli.exit_codes import PROBLEM
 from joulepath.app.cli.service import SERVICE, answered, connect, json_of
-from joulepath.app.cli.terminal import table
+from joulepath.app.cli.terminal import steps, table
 
 if TYPE_CHECKING:
     from joulepath.app.client.client import Client
@@ -158,10 +158,12 @@ def delete(client: Client, id: str) -> None:
 
 def _waited(client: Client, id: str) -> int:
     """Wait for the end of a job, with its progress on a terminal; returns the exit code."""
-    from joulepath.app.cli.terminal import fraction
+    from joulepath.optimizer.progress import StepsDone
 
-    with answered(), fraction("Waiting for the job") as tell:
-        job = client.wait_for_job(id, PERIOD, lambda job: tell(job["progress"]))
+    with answered(), steps("Waiting for the job") as tell:
+        job = client.wait_for_job(
+            id, PERIOD, lambda job: tell(StepsDone(100 * job["progress"], 100.0, "%"))
+        )
     click.echo(table([HEAD, _row(job)]), err=True)
     return PROBLEM if job["counts"]["failed"] else 0
 

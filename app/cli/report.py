@@ -125,7 +125,7 @@ def report(
         fields |= {} if robot is None else {"robot": robot}
         log = read_log_file(fields, Path(file), request_id)
         task = Equipped(task, (partial(log_given, log),))
-    with terminal.progress("Writing the report"):
+    with terminal.steps("Writing the report"):
         result = result_of(task, request.with_advice, request_id)
     write(result.document, output)
 
@@ -161,7 +161,7 @@ def check(file: Path, no_answer: bool) -> int:
 
     request_id = new_id()
     try:
-        with terminal.progress("Computing it again"):
+        with terminal.steps("Computing it again"):
             result = result_of(
                 CheckTask(file.read_bytes(), not no_answer, request_id), 0, request_id
             )

@@ -9,57 +9,23 @@ from typing import Any
 
 
 @contextmanager
-def progress(description: str) -> Iterator[None]:
-    """Show a spinner with the elapsed time while the body runs, if standard error is a
-    terminal."""
-    if not sys.stderr.isatty():
-        yield
-        return
+def steps(title: str) -> Iterator[Callable[[Any], None]]:
+    """Show a progress bar while the body runs, if standard error is a terminal.
 
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
-        # brackets in a description are text, not markup
-        shown.add_task(description.replace("[", r"\["), total=None)
-        yield
-
-
-@contextmanager
-def steps(title: str) -> Iterator[None]:
-    """Show a progress bar while the body runs a task, if standard error is a terminal.
-
-    The events of the task move the bar.
+    The events of a task that the body runs move the bar.
 
     Args:
         title: text before the bar.
+
+    Yields:
+        The listener of the bar, for steps of the body itself.
     """
     # imported late to keep `joulepath --help` fast
     from joulepath.app.engine.listening import listening
     from joulepath.optimizer.presentation.progress_bar import progress_bar
 
     with progress_bar(title, delay=0.0) as tell, listening(tell):
-        yield
-
-
-@contextmanager
-def fraction(description: str) -> Iterator[Callable[[float], object]]:
-    """Show a bar while the body runs, if standard error is a terminal.
-
-    Yields:
-        A function to call with the completed share, from 0 to 1.
-    """
-    if not sys.stderr.isatty():
-        yield lambda share: None
-        return
-
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as shown:
-        bar = shown.add_task(description, total=1.0)
-        yield lambda share: shown.update(bar, completed=share)
+        yield tell
 
 
 def problem(document: dict[str, Any], remedy: str) -> str:

@@ -12,6 +12,7 @@ from joulepath.app.exceptions.access import Unauthenticated
 from joulepath.app.exceptions.base import InvalidRequest, ServiceError
 from joulepath.app.exceptions.transport import MethodNotAllowed, NotFound, UnsupportedMediaType
 from joulepath.app.http.authentication import challenge
+from joulepath.app.http.json_route import media_type
 from joulepath.app.http.problems import invalid_request, problem_of, reported
 from joulepath.optimizer.exceptions import DeclaredError
 
@@ -55,7 +56,7 @@ def _is_not_json(request: Request, error: RequestValidationError) -> bool:
     """Whether the body was not read because it is declared as something else. FastAPI then
     validates its bytes.
     """
-    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    kind = media_type(request.headers)
     is_json = kind.startswith("application/") and kind.endswith(("/json", "+json"))
     return not is_json and kind != "" and any(each["loc"] == ("body",) for each in error.errors())
 

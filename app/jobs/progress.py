@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from joulepath.app.store.job_events import Report
 from joulepath.app.tasks.job_request import CYCLE, IDENTIFY
@@ -25,13 +26,14 @@ class Found:
         if not isinstance(event, StepsDone):
             self._of_search(event)
         elif event.total:
-            self.report = self.report.with_steps(event.done / event.total)
+            self.report = replace(self.report, share=event.done / event.total)
             self.is_news = True
 
     def _note(self, event: Event) -> None:
         if isinstance(event, CandidateTried):
-            self.report = self.report.with_one_solved()
+            self.report = replace(self.report, solved=self.report.solved + 1)
         elif isinstance(event, Improved):
             known = event.bound is not None and math.isfinite(event.bound)
-            self.report = self.report.with_best(event.energy, event.bound if known else None)
+            bound = event.bound if known else None
+            self.report = replace(self.report, found=event.energy, bound=bound)
         self.is_news = True

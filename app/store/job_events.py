@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -32,18 +32,6 @@ class Report:
     bound: float | None = None
     solved: int = 0
     share: float | None = None
-
-    def with_one_solved(self) -> Report:
-        """The report after one more candidate."""
-        return replace(self, solved=self.solved + 1)
-
-    def with_steps(self, share: float) -> Report:
-        """The report after this share of the steps."""
-        return replace(self, share=share)
-
-    def with_best(self, found: float, bound: float | None) -> Report:
-        """The report with another best answer."""
-        return replace(self, found=found, bound=bound)
 
 
 def counts_of(session: Session, job_ids: list[str]) -> dict[str, Counts]:

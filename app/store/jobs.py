@@ -164,15 +164,19 @@ def page_of_kind(
     return found[:limit], following([job for job, _, _ in found], limit)
 
 
-def requests(session: Session, job_id: str, limit: int, after: int) -> list[JobRequest]:
+def requests(
+    session: Session, job_id: str, limit: int, after: int, *which: ColumnElement[bool]
+) -> list[JobRequest]:
     """Up to `limit` requests of a job with an index above `after`, in order, without their
     bodies."""
-    return _page(session, job_id, limit, after)
+    query = select(JobRequest).where(JobRequest.job_id == job_id, JobRequest.number > after, *which)
+    query = query.order_by(JobRequest.number).limit(limit)
+    return list(session.scalars(query.options(defer(JobRequest.body, raiseload=True))))
 
 
 def ended(session: Session, job_id: str, limit: int, after: int) -> list[JobRequest]:
     """Ended requests, otherwise as `requests`."""
-    return _page(session, job_id, limit, after, JobRequest.state.in_(ENDED))
+    return requests(session, job_id, limit, after, JobRequest.state.in_(ENDED))
 
 
 def results(
@@ -281,18 +285,6 @@ def _delete(session: Session, job_ids: list[str]) -> None:
     # requests and events go with their job; requests refer to answers, and so go first
     session.execute(delete_from(Job).where(Job.id.in_(job_ids)))
     session.execute(delete_from(Answer).where(Answer.job_id.in_(job_ids)))
-
-
-def _page(
-    session: Session, job_id: str, limit: int, after: int, *which: ColumnElement[bool]
-) -> list[JobRequest]:
-    query = select(JobRequest).where(JobRequest.job_id == job_id, JobRequest.number > after, *which)
-    query = (
-        query.order_by(JobRequest.number)
-        .limit(limit)
-        .options(defer(JobRequest.body, raiseload=True))
-    )
-    return list(session.scalars(query))
 
 
 def _job(session: Session, job_id: str, lock: bool = False) -> Job:

@@ -75,6 +75,11 @@ def result_of(
 
 def documents_of(result: TaskResult) -> tuple[Json, list[Json]]:
     """The answer in a result, and the answers of its moves."""
-    parts = {each.path: orjson.loads(each.body) for each in result.stored}
-    answer = orjson.loads(result.not_kept().document)
+    answer, parts = unpacked(result)
     return answer, [parts[path] for path in paths_of_moves(answer)]
+
+
+def unpacked(result: TaskResult) -> tuple[Json, dict[str, Json]]:
+    """The answer in a result, and the answers to which it refers, by their paths."""
+    parts = {each.path: orjson.loads(each.body) for each in result.stored}
+    return orjson.loads(result.not_kept().document), parts

@@ -24,7 +24,6 @@ from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.declared import Joules, Ratio, Seconds
-from joulepath.optimizer.dynamics.dwell import holding_power
 from joulepath.optimizer.dynamics.losses import saving
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import DeclaredError
@@ -157,10 +156,8 @@ def _has_own_wait(task: Task) -> bool:
 
 def _holding_power(task: Task, move: Json) -> float:
     """Power [W] while the motors hold the arm at the goal of a move."""
-    arm = arm_of(as_asked(task), move)
     q = np.array(move["branch"]["goal"]["q"])
-    still = np.zeros_like(q)
-    return float(holding_power(arm, Plant(arm).torques(q[None], still[None], still[None])[0]))
+    return float(Plant(arm_of(as_asked(task), move)).holding_power(q))
 
 
 def _rests(task: Task, answer: Json) -> float:

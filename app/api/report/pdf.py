@@ -23,8 +23,7 @@ def check_typst() -> None:
 
 
 def pdf(report: Report, bundle: Bundle) -> bytes:
-    """The file. Equal reports are equal files. Raises NoTypst."""
-    check_typst()
+    """The file. Equal reports are equal files. `check_typst` comes before it."""
     import typst
 
     made = datetime.fromisoformat(bundle.made).replace(tzinfo=UTC)

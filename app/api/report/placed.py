@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import orjson
-
+from joulepath.app.api.advice.answered import unpacked
 from joulepath.app.api.placement.request import PlacementRequest
 from joulepath.app.api.placement.task import PlacementTask
 from joulepath.app.api.report.bundle import Bundle
@@ -48,8 +47,7 @@ def placed(
         return answer, _rows(asked, answer, kept_answers)
     with inside("placement"):
         result = PlacementTask(asked, request_id).run(deadline)
-    parts = {each.path: orjson.loads(each.body) for each in result.stored}
-    answer = orjson.loads(result.not_kept().document)
+    answer, parts = unpacked(result)
     return answer, _rows(asked, answer, lambda names: [parts[name] for name in names])
 
 
