@@ -40,9 +40,7 @@ from benchmarks.checks import gap_of
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
-from joulepath.optimizer.dynamics.dwell import holding_power
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.plan_cycle import plan_cycle
@@ -150,20 +148,12 @@ def excess(answer: CycleSolution, free: CycleSolution | None) -> float:
     ]
     if free is not None and answer.duration >= free.duration:
         held = [
-            holding_power(
-                move.planned.arm_after, _torque_at(move.planned.arm_after, move.solution.goal.q)
-            )
-            for move in free.moves
+            Plant(move.planned.arm_after).holding_power(move.solution.goal.q) for move in free.moves
         ]
         known.append(
             free.energy.electrical.total + (answer.duration - free.duration) * float(min(held))
         )
     return answer.energy.electrical.total / min(known) - 1 if known else 0.0
-
-
-def _torque_at(arm: Arm, q: Array) -> Array:
-    still = np.zeros((1, len(q)))
-    return np.asarray(Plant(arm).torques(q[None], still, still)[0])
 
 
 def _sums(answer: CycleSolution) -> dict[str, float]:

@@ -99,7 +99,7 @@ def plan_cycle(
         began, tell = clock(), only_news(tell)
         cycle = _divided(cycle, clock)
         found = with_free_orientations(cycle, lambda other: _valued(other, clock, tell), clock)
-        _tell_found(tell, found)
+        tell(Improved(found.energies.of(found.objective), found.duration, found.lower_bound))
         end = Deadline.after(cycle.deadline, clock).earlier_by(clock() - began)
         return replace(in_equal_times(cycle, found, end), wall_time=clock() - began)
 
@@ -157,10 +157,6 @@ def _divided(cycle: Cycle, clock: Clock) -> Cycle:
     except DeadlinePassed:
         raise DeadlineExceeded([]) from None
     return cycle if divided is cycle else replace(divided, deadline=max(end.left, MOVE.least_time))
-
-
-def _tell_found(tell: Tell, found: CycleSolution) -> None:
-    tell(Improved(found.energies.of(found.objective), found.duration, found.lower_bound))
 
 
 def _in_given_order(cycle: Cycle, clock: Clock, tell: Tell) -> CycleSolution:

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import ClosestPair
-from joulepath.optimizer.dynamics.dwell import holding_power, holding_times, with_dwell
+from joulepath.optimizer.dynamics.dwell import holding_times, with_dwell
 from joulepath.optimizer.dynamics.interval import arm_spread
 from joulepath.optimizer.dynamics.kernel import Kernel
 from joulepath.optimizer.dynamics.plant import Plant
@@ -218,14 +218,6 @@ class PreparedProblem(Plant):
             )
         return broken
 
-    def holding_power(self, q: Array) -> Array:
-        """Power (...) [W] drawn while the motors hold the arm still at q (..., nq) [rad]."""
-        configurations = q.reshape(-1, q.shape[-1])
-        standstill = np.zeros_like(configurations)
-        return holding_power(
-            self.arm, self.torques(configurations, standstill, standstill)
-        ).reshape(q.shape[:-1])
-
     def energy(self, spline: Spline) -> Energy:
         """Energy of a motion and of the dwell after it, exact except for quadrature."""
         energy, dwell = super().energy(spline), self.problem.dwell
@@ -239,9 +231,8 @@ class PreparedProblem(Plant):
         moving, dwell = super().sensitivity(spline), self.problem.dwell
         if dwell is None:
             return moving
-        still = np.zeros((1, self.arm.robot.nq))
         q_end = spline.control_points[-1]
-        held = self.torques(q_end[None], still, still)[0]
+        held = self.holding_torques(q_end[None])[0]
         times = holding_times(dwell, spline.duration)
         return moving + waiting_sensitivity(
             self.arm, q_end, held, *times, dwell, arm_spread(self.arm)

@@ -18,6 +18,7 @@ from joulepath.optimizer.cycle.cycle_solution import (
     CycleBaselineName,
     CycleEnergies,
     CycleSolution,
+    energies_of,
 )
 from joulepath.optimizer.cycle.moves import moves_of
 from joulepath.optimizer.cycle.rest_energy import dwell_energies, rest_sensitivity
@@ -111,22 +112,14 @@ def chain_baseline(
     """Baseline of a chain with known motions, compared with our energies; None if its duration is
     not allowed.
     """
-    moves = [search.solutions[each] for each in search.pairs(nodes)]
-    # summed in the order of our cycle, so that the same chain gives the same energy bit for bit
-    energy = sum(
-        a.energy.electrical.total + b
-        for a, b in zip(moves, dwell_energies_of_chain(search, nodes), strict=True)
-    )
-    duration = sum(move.duration for move in moves) + search.cycle.dwell_time
+    found = [search.solutions[each] for each in search.pairs(nodes)]
+    duration = sum(each.duration for each in found) + search.cycle.dwell_time
     if search.cycle.clamped_duration(duration) != duration:
         return None
-    sensitivity = reduce(add, [move.sensitivity for move in moves]) + rest_sensitivity_of_chain(
-        search, nodes
-    )
-    known = MotionEnergy(energy, sensitivity, sum(move.duration for move in moves))
-    theirs = CycleEnergies(known, sum(move.energy.mechanical.total for move in moves))
-    baseline = cycle_baseline(search.cycle, name, duration, theirs, [], ours)
-    return replace(baseline, moves=moves_of(search, nodes, moves, {}))
+    # the same chain as ours has the same energy bit for bit
+    moves = moves_of(search, nodes, found, {})
+    baseline = cycle_baseline(search.cycle, name, duration, energies_of(moves), [], ours)
+    return replace(baseline, moves=moves)
 
 
 def controller_default(

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from joulepath.models.robot import Array, Limits, Mask
 from joulepath.optimizer.bounds.lower_bound import lower_bounds
-from joulepath.optimizer.cycle.layers import arms_at
+from joulepath.optimizer.cycle.layers import first_causes, rests_at
 from joulepath.optimizer.cycle.path_segments import PathSegment, path_segments
 from joulepath.optimizer.cycle.stop_layers import layers_of_stop
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
@@ -28,7 +28,6 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.tool_path import Section
-from joulepath.optimizer.search.end_feasibility import check_configurations
 from joulepath.optimizer.search.errors import PathInfeasible
 
 
@@ -129,14 +128,9 @@ def _places(cycle: Cycle, models: ModelsOfArms, stop: Stop) -> list[float] | Non
     segments = path_segments(arm, course, stop.branch)
     if not segments:
         return None
-    rests = [
-        Problem(arm=each, start=stop.target, goal=stop.target) for each in arms_at(cycle, stop.name)
-    ]
+    rests = rests_at(cycle, models, stop.name, stop.target)
     free = models.prepared(Problem(arm=cycle.arm, start=stop.target, goal=stop.target))
-    return _cheapest_division(
-        segments,
-        *_reconfiguration_bounds(free, [models.prepared(each) for each in rests], segments),
-    )
+    return _cheapest_division(segments, *_reconfiguration_bounds(free, rests, segments))
 
 
 def _reconfiguration_bounds(
@@ -157,8 +151,7 @@ def _reconfiguration_bounds(
     on = np.stack([segment.covers(PLACES) for segment in segments], axis=1)
     q = np.stack([segment.configurations(PLACES) for segment in segments], axis=1)
     rest = on.copy()
-    for prepared in rests:
-        rest[rest] = [cause is None for cause in check_configurations(prepared, q[rest])]
+    rest[rest] = [cause is None for cause in first_causes(rests, q[rest])]
     both = rest[:, :, None] & rest[:, None, :] & ~np.eye(len(segments), dtype=bool)
     cost = np.full(both.shape, np.inf)
     if both.any():

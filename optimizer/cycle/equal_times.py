@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -9,11 +10,15 @@ import numpy as np
 
 from joulepath.optimizer.cycle.cycle_baselines import broken_moves, cycle_baseline
 from joulepath.optimizer.cycle.cycle_move import CycleMove
-from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleEnergies, CycleSolution
+from joulepath.optimizer.cycle.cycle_solution import (
+    CycleBaseline,
+    CycleBaselineName,
+    CycleEnergies,
+    CycleSolution,
+)
 from joulepath.optimizer.cycle.move_problem import problem_of
 from joulepath.optimizer.cycle.rest_energy import rest_energy, rest_sensitivity
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
-from joulepath.optimizer.dynamics.dwell import holding_power
 from joulepath.optimizer.dynamics.interval import MotionEnergy
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
@@ -63,28 +68,19 @@ def _priced(cycle: Cycle, found: CycleSolution, each: CycleBaseline) -> CycleBas
     )
     ours, theirs = found.energies, each.energies
     if wait > 0:
-        ours = replace(ours, electrical=_sum(ours.electrical, more))
+        ours = replace(ours, electrical=ours.electrical + more)
     else:
-        theirs = replace(theirs, electrical=_sum(theirs.electrical, more))
+        theirs = replace(theirs, electrical=theirs.electrical + more)
     again = cycle_baseline(cycle, each.name, each.duration, theirs, [], ours)
     return replace(each, saving=again.saving, saving_interval=again.saving_interval)
 
 
 def _rest(cycle: Cycle, move: CycleMove, length: float) -> MotionEnergy:
     """A wait of `length` [s] after a move."""
-    q, arm = move.solution.goal.q, move.planned.arm_after
-    still = np.zeros((1, len(q)))
-    hold = float(holding_power(arm, Plant(arm).torques(q[None], still, still)[0]))
+    q = move.solution.goal.q
+    hold = float(Plant(move.planned.arm_after).holding_power(q))
     energy = rest_energy(cycle, move.planned, length, hold)
     return MotionEnergy(energy, rest_sensitivity(cycle, move.planned, length, q), 0.0)
-
-
-def _sum(first: MotionEnergy, second: MotionEnergy) -> MotionEnergy:
-    return MotionEnergy(
-        first.energy + second.energy,
-        first.sensitivity + second.sensitivity,
-        first.duration + second.duration,
-    )
 
 
 def _by_motions(
@@ -100,32 +96,14 @@ def _by_motions(
     """
     if found.storage is not None:
         return None
-    parts = list[Baseline | None]()
+    changed = list[tuple[CycleMove, Baseline]]()
     for move in found.moves:
         known = [each for each in move.solution.baselines if each.name == name]
         same = [each for each in known if np.array_equal(each.at_goal.q, move.solution.goal.q)]
         if not same and move.planned.tool_path is None:
             return None
-        parts.append(same[0] if same else None)
-    ours, energies = found.energies, found.energies
-    for move, part in zip(found.moves, parts, strict=True):
-        if part is not None:
-            energies = _with_motion(energies, move.solution, part)
-    changed = [
-        (move.planned, part)
-        for move, part in zip(found.moves, parts, strict=True)
-        if part is not None
-    ]
-    if not changed:
-        return None
-    return cycle_baseline(
-        cycle,
-        name,
-        found.duration,
-        energies,
-        broken_moves((move, part.reason) for move, part in changed),
-        ours,
-    )
+        changed += [(move, each) for each in same[:1]]
+    return _with_motions(cycle, found, name, changed, found.duration)
 
 
 def _along_waypoints(cycle: Cycle, found: CycleSolution, end: Deadline) -> list[CycleBaseline]:
@@ -143,20 +121,17 @@ def _along_waypoints(cycle: Cycle, found: CycleSolution, end: Deadline) -> list[
             ways = [_ways_of(cycle, move, end) for move in found.moves]
     except DeadlinePassed:
         return []
+    pairs = [(move, way) for move, way in zip(found.moves, ways, strict=True) if way is not None]
     for name in WAYS:
-        changed = [
-            (move, way) for move, way in zip(found.moves, ways, strict=True) if way is not None
-        ]
-        if not changed or not all(name in way for _, way in changed):
+        if not all(name in way for _, way in pairs):
             continue
-        energies, duration = found.energies, found.duration
-        for move, way in changed:
-            energies = _with_motion(energies, move.solution, way[name])
+        duration = found.duration
+        for move, way in pairs:
             duration += way[name].duration - move.solution.duration
-        if cycle.clamped_duration(duration) != duration:
-            continue
-        broken = broken_moves((move.planned, way[name].reason) for move, way in changed)
-        table.append(cycle_baseline(cycle, name, duration, energies, broken, found.energies))
+        if cycle.clamped_duration(duration) == duration:
+            changed = [(move, way[name]) for move, way in pairs]
+            other = _with_motions(cycle, found, name, changed, duration)
+            table += [] if other is None else [other]
     return table
 
 
@@ -170,6 +145,23 @@ def _ways_of(cycle: Cycle, move: CycleMove, end: Deadline) -> dict[str, Baseline
     least, ours = move.solution.duration, move.solution.energy.electrical.total
     found = along_waypoints(PreparedProblem.of(problem), q_start, q_goal, least, ours, end)
     return {each.name: each for each in found}
+
+
+def _with_motions(
+    cycle: Cycle,
+    found: CycleSolution,
+    name: CycleBaselineName,
+    changed: Sequence[tuple[CycleMove, Baseline]],
+    duration: float,
+) -> CycleBaseline | None:
+    """The baseline of a duration [s] with other motions of some moves; None without any."""
+    if not changed:
+        return None
+    energies = found.energies
+    for move, other in changed:
+        energies = _with_motion(energies, move.solution, other)
+    broken = broken_moves((move.planned, other.reason) for move, other in changed)
+    return cycle_baseline(cycle, name, duration, energies, broken, found.energies)
 
 
 def _with_motion(energies: CycleEnergies, own: Solution, other: Baseline) -> CycleEnergies:

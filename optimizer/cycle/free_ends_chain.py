@@ -35,7 +35,7 @@ from joulepath.optimizer.cycle.chains import LeastChain
 from joulepath.optimizer.cycle.layer_cover import LayerCover
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.cycle.legs import Leg
-from joulepath.optimizer.cycle.rest_energy import least_holding_power, rest_energy
+from joulepath.optimizer.cycle.rest_energy import least_dwell_cost
 from joulepath.optimizer.cycle.single_joint_bound import Boxes, SingleJointBound
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.kinematics.angles import wrapped
@@ -129,7 +129,7 @@ class FreeEndsChain:
         """The chain; None if no layer needs a cover, or a layer cannot be covered."""
         covered = dict[int, LayerCover]()
         for k, layer in enumerate([legs[0].start, *(leg.goal for leg in legs)]):
-            if layer.complete and not layer.sampled:
+            if layer.closed:
                 continue
             nearest = (
                 not cycle.windings
@@ -284,15 +284,9 @@ class FreeEndsChain:
 
     def _dwells(self, k: int) -> Array:
         """Lower bound (g,) [J] of the dwell after leg `k` at every node of its goal."""
-        move = self.cycle.moves[k]
         if k + 1 not in self.covered:
             return self.legs[k].dwell
-        electrical = self.cycle.objective == "electrical"
-        dwell = (
-            rest_energy(self.cycle, move, move.dwell, least_holding_power(move))
-            if electrical
-            else 0.0
-        )
+        dwell = least_dwell_cost(self.cycle, self.cycle.moves[k])
         return np.full(len(self.covered[k + 1].cells.angle), dwell)
 
     def _first_costs(self) -> Array:

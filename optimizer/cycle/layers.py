@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -15,7 +16,7 @@ from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
 from joulepath.optimizer.kinematics.tcp import T_last_tcp
 from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace
-from joulepath.optimizer.prepared_problem import ModelsOfArms
+from joulepath.optimizer.prepared_problem import ModelsOfArms, PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -23,7 +24,11 @@ from joulepath.optimizer.problem.cycle import START, Cycle
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Target, members
-from joulepath.optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
+from joulepath.optimizer.search.end_feasibility import (
+    InvalidReason,
+    check_configurations,
+    raise_if_none_is_left,
+)
 from joulepath.optimizer.search.ends import ends_of
 
 
@@ -74,6 +79,11 @@ class Layer:
         """Whether some configurations are samples of infinitely many."""
         return self.sampled_poses or any(end.sampled for end in self.ends)
 
+    @property
+    def closed(self) -> bool:
+        """Whether all configurations at the place are known."""
+        return self.complete and not self.sampled
+
 
 def layer_of(
     cycle: Cycle,
@@ -100,17 +110,10 @@ def layer_of(
         JoulepathError: the errors of `optimize` for an end; they name the place.
     """
     name = place if place == START else f"stops/{place}"
-    problems = [
-        Problem(arm=arm, start=target, goal=target, branch=branch) for arm in arms_at(cycle, place)
-    ]
-    problem = problems[0]
-    found, _ = ends_of(models.prepared(problem), name, problem.goal)
-    q = np.array([end.q for end in found])
-    causes_of_arms = [check_configurations(models.prepared(each), q) for each in problems]
-    either = [
-        next((cause for cause in causes if cause is not None), None)
-        for causes in zip(*causes_of_arms, strict=True)
-    ]
+    rests = rests_at(cycle, models, place, target, branch)
+    goal = rests[0].problem.goal
+    found, _ = ends_of(rests[0], name, goal)
+    either = first_causes(rests, np.array([end.q for end in found]))
     raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in found], either)
     feasible = [end for end, cause in zip(found, either, strict=True) if cause is None]
     middle = (cycle.arm.active_limits.q_min + cycle.arm.active_limits.q_max) / 2
@@ -130,9 +133,9 @@ def layer_of(
     of_ends = np.array([each.q for each in feasible])[end]
     turns = np.round((positions - of_ends) / (2 * np.pi)).astype(np.intp)
     kinematics = inverse_kinematics_for(cycle.arm.robot)
-    given = all(isinstance(member, np.ndarray) for member in members(problem.goal))
+    given = all(isinstance(member, np.ndarray) for member in members(goal))
     complete = given or (kinematics is not None and kinematics.complete)
-    free = None if complete else _about_last_axis(cycle.arm, problem.goal)
+    free = None if complete else _about_last_axis(cycle.arm, goal)
     return Layer(name, feasible, positions, end, turns, complete, free_pose=free)
 
 
@@ -156,6 +159,29 @@ def arms_at(cycle: Cycle, place: str) -> list[Arm]:
         )
     ]
     return [arm for k, arm in enumerate(arms) if all(arm is not other for other in arms[:k])]
+
+
+def rests_at(
+    cycle: Cycle,
+    models: ModelsOfArms,
+    place: str,
+    target: Target,
+    branch: BranchFilter | None = None,
+) -> list[PreparedProblem]:
+    """Problems without a motion at a place, one for every arm of `arms_at`."""
+    return [
+        models.prepared(Problem(arm=arm, start=target, goal=target, branch=branch))
+        for arm in arms_at(cycle, place)
+    ]
+
+
+def first_causes(rests: Sequence[PreparedProblem], q: Array) -> list[InvalidReason | None]:
+    """Why some arm cannot be in each of the configurations q (k, nq) [rad]; None where all can."""
+    causes_of_arms = [check_configurations(prepared, q) for prepared in rests]
+    return [
+        next((cause for cause in causes if cause is not None), None)
+        for causes in zip(*causes_of_arms, strict=True)
+    ]
 
 
 def _nodes(end: EndConfiguration, windings: bool, middle: Array) -> list[tuple[float, ...]]:

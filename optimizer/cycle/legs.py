@@ -222,7 +222,7 @@ class Leg:
         """Whether all configurations of the layers are known: none is a sample, none can be
         missing.
         """
-        return all(layer.complete and not layer.sampled for layer in self.layers)
+        return all(layer.closed for layer in self.layers)
 
     def passes(self, s: int, g: int) -> list[Array]:
         """Joint positions (nq,) [rad] that the motion of a pair passes through."""

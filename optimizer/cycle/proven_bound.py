@@ -19,7 +19,7 @@ from joulepath.optimizer.cycle.free_ends_chain import FreeEndsChain
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.cycle.passing_leg import PassingLeg
-from joulepath.optimizer.cycle.rest_energy import least_holding_power, rest_energy
+from joulepath.optimizer.cycle.rest_energy import least_dwell_cost
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.kinematics.covers.wrist_geometry import greatest_rates
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -68,16 +68,15 @@ def bounded_costs(cycle: Cycle, move: PlannedMove, leg: Leg, deadline: Deadline)
     """
     costs = leg.least_costs
     if isinstance(leg, PassingLeg) and leg.direct is not None:
-        if not all(layer.complete and not layer.sampled for layer in leg.between):
+        if not all(layer.closed for layer in leg.between):
             # the bound of the travel holds for the known passes alone
             costs = leg.direct.least_costs
         leg = leg.direct
-    open_start, open_goal = (layer.sampled or not layer.complete for layer in (leg.start, leg.goal))
+    open_start, open_goal = (not layer.closed for layer in (leg.start, leg.goal))
     if not open_start and not open_goal:
         return costs
     least = _bound_of_unknown(leg, float(leg.bound.min()), deadline)
-    electrical = cycle.objective == "electrical"
-    dwell = rest_energy(cycle, move, move.dwell, least_holding_power(move)) if electrical else 0.0
+    dwell = least_dwell_cost(cycle, move)
     if open_goal:
         costs = np.hstack([costs, np.full((len(costs), 1), least + dwell)])
     if open_start:
@@ -95,10 +94,7 @@ def _bound_of_unknown(leg: Leg, enough: float, deadline: Deadline) -> float:
         return _bound_of_any(leg)
     if all(layer.complete and not layer.sampled_poses for layer in leg.layers):
         return _bound_of_self_motions(leg, deadline)
-    if all(
-        layer.free_pose is not None or (layer.complete and not layer.sampled)
-        for layer in leg.layers
-    ):
+    if all(layer.free_pose is not None or layer.closed for layer in leg.layers):
         return _bound_of_free_poses(leg, enough, deadline)
     return _bound_of_any(leg)
 
@@ -149,7 +145,7 @@ def _levels(leg: Leg, layer: Layer) -> tuple[float, float]:
     joint.
     """
     known = [leg.prepared.potential(end.q) for end in layer.ends]
-    if layer.complete and not layer.sampled:
+    if layer.closed:
         return min(known), max(known)
     reach = np.pi * float(greatest_rates(leg.prepared.arm).sum())
     return max(known) - reach, min(known) + reach

@@ -24,10 +24,8 @@ def holding_powers(move: PlannedMove, goal: Layer) -> Array:
     """Power (n,) [W] of holding the arm on its motors after a move, for every configuration of its
     goal.
     """
-    arm = move.arm_after
-    still = np.zeros((len(goal.ends), arm.robot.nq))
-    tau = Plant(arm).torques(np.array([end.q for end in goal.ends]), still, still)
-    return np.asarray(holding_power(arm, tau)[goal.end])
+    q = np.array([end.q for end in goal.ends])
+    return np.asarray(Plant(move.arm_after).holding_power(q)[goal.end])
 
 
 def long_wait_powers(cycle: Cycle, move: PlannedMove, goal: Layer) -> Array:
@@ -66,9 +64,15 @@ def rest_sensitivity(cycle: Cycle, move: PlannedMove, length: float, q: Array) -
     if length <= 0:
         return Sensitivity(np.zeros_like(spread.mean), 0.0)
     dwell = cycle.dwell_of(length)
-    still = np.zeros((1, len(q)))
-    held = Plant(arm).torques(q[None], still, still)[0]
+    held = Plant(arm).holding_torques(q[None])[0]
     return waiting_sensitivity(arm, q, held, *holding_times(dwell, 0.0), dwell, spread)
+
+
+def least_dwell_cost(cycle: Cycle, move: PlannedMove) -> float:
+    """Lower bound [J] of the objective of the dwell after a move, in any configuration."""
+    if cycle.objective == "mechanical":
+        return 0.0
+    return rest_energy(cycle, move, move.dwell, least_holding_power(move))
 
 
 def dwell_energies(cycle: Cycle, move: PlannedMove, goal: Layer) -> Array:

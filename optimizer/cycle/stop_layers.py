@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.cycle.layers import Layer, arms_at, layer_of
+from joulepath.optimizer.cycle.layers import Layer, first_causes, layer_of, rests_at
 from joulepath.optimizer.cycle.legs import LEG
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
@@ -26,12 +26,10 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import START, Cycle
 from joulepath.optimizer.problem.line import Line
 from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stop_path import StopPath, at_stop
 from joulepath.optimizer.problem.stops import APPROACH, RETREAT, Stop
 from joulepath.optimizer.problem.targets import SampledPoses, Target
 from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.search.end_feasibility import check_configurations
 from joulepath.optimizer.search.ends import label_of
 from joulepath.optimizer.search.errors import PathAttempt, PathInfeasible
 from joulepath.optimizer.search.path_ends import attempt_of
@@ -255,28 +253,21 @@ def _layer_at_end(cycle: Cycle, origin: Layer, place: str, found: list[Trace]) -
         for reached, end in zip(q, origin.ends, strict=True)
     ]
     moved = (q - np.array([end.q for end in origin.ends]))[origin.end]
-    complete = origin.complete and not origin.sampled
     return replace(
         origin,
         name=f"stops/{place}",
         ends=ends,
         q=origin.q + moved,
-        complete=complete,
+        complete=origin.closed,
         traces=tuple(found),
     )
 
 
 def _blocked_ends(cycle: Cycle, models: ModelsOfArms, stop: Stop, end: Layer) -> Mask:
     """Configurations (e,) at the end of a path that are infeasible with some arm there."""
-    problems = [
-        Problem(arm=arm, start=stop.target, goal=stop.target)
-        for arm in arms_at(cycle, end.name.removeprefix("stops/"))
-    ]
-    q = np.array([each.q for each in end.ends])
-    causes_of_arms = [check_configurations(models.prepared(problem), q) for problem in problems]
-    return np.array(
-        [any(cause is not None for cause in causes) for causes in zip(*causes_of_arms, strict=True)]
-    )
+    rests = rests_at(cycle, models, end.name.removeprefix("stops/"), stop.target)
+    causes = first_causes(rests, np.array([each.q for each in end.ends]))
+    return np.array([cause is not None for cause in causes])
 
 
 def _nodes_that_follow(cycle: Cycle, origin: Layer, found: list[Trace], blocked: Mask) -> Mask:

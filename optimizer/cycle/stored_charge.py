@@ -15,7 +15,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.bus_flow import BusFlow, charge_steps, charges, pooled
-from joulepath.optimizer.dynamics.dwell import brake_power, holding_power, holding_times
+from joulepath.optimizer.dynamics.dwell import brake_power, holding_times
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
@@ -56,8 +56,8 @@ class Demand:
         """
         if length <= 0:
             return cls(np.zeros(0), np.zeros(0))
-        arm, still = move.arm_after, np.zeros((1, len(q)))
-        hold = float(holding_power(arm, Plant(arm).torques(q[None], still, still))[0])
+        arm = move.arm_after
+        hold = float(Plant(arm).holding_power(q))
         dwell = cycle.dwell_of(before + length)
         done = holding_times(cycle.dwell_of(before), 0.0) if before > 0 else (0.0, 0.0)
         lengths = np.array(holding_times(dwell, 0.0)) - done

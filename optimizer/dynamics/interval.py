@@ -30,6 +30,13 @@ class MotionEnergy:
     sensitivity: Sensitivity
     duration: float
 
+    def __add__(self, other: MotionEnergy) -> MotionEnergy:
+        return MotionEnergy(
+            self.energy + other.energy,
+            self.sensitivity + other.sensitivity,
+            self.duration + other.duration,
+        )
+
 
 def arm_spread(arm: Arm) -> Spread:
     """Possible errors of the figures of an arm, without the figures that the request gives

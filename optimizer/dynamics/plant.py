@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from joulepath.models.robot import Array, FrictionLaw
 from joulepath.optimizer.dynamics.bus_flow import charges, drawn_at
+from joulepath.optimizer.dynamics.dwell import holding_power
 from joulepath.optimizer.dynamics.interval import arm_spread
 from joulepath.optimizer.dynamics.kernel import Kernel, kernel_for
 from joulepath.optimizer.dynamics.kernel_expressions import Parameters
@@ -187,6 +188,16 @@ class Plant:
         return np.asarray(
             power_flow(self.torques(q, v, a), v, a, self.arm.drives, self.friction).tau_motor
         )
+
+    def holding_torques(self, q: Array) -> Array:
+        """Torques (k, nq) [N·m] that hold the arm still at q (k, nq) [rad]."""
+        still = np.zeros_like(q)
+        return self.torques(q, still, still)
+
+    def holding_power(self, q: Array) -> Array:
+        """Power (...) [W] drawn while the motors hold the arm still at q (..., nq) [rad]."""
+        held = self.holding_torques(q.reshape(-1, q.shape[-1]))
+        return holding_power(self.arm, held).reshape(q.shape[:-1])
 
     def potential(self, q: Array) -> float:
         """Potential energy [J] of arm and payload."""

@@ -39,7 +39,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, FrictionLaw
 from joulepath.optimizer.bounds.net_energy import KNEE_DEFICIT
-from joulepath.optimizer.cycle.rest_energy import least_holding_power, rest_energy
+from joulepath.optimizer.cycle.rest_energy import least_dwell_cost, least_holding_power
 from joulepath.optimizer.dynamics.dwell import brake_power
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
@@ -228,10 +228,7 @@ class CycleBound:
     @cached_property
     def dwells(self) -> float:
         """Least energy of all dwells [J]."""
-        return sum(
-            rest_energy(self.cycle, move, move.dwell, least_holding_power(move))
-            for move in self.cycle.moves
-        )
+        return sum(least_dwell_cost(self.cycle, move) for move in self.cycle.moves)
 
     @cached_property
     def gain(self) -> float:

@@ -159,8 +159,7 @@ class Rounds:
         ):
             return None
         search = CycleSearch(cycle, self.clock)
-        layers = [layer for leg in search.legs for layer in leg.layers]
-        if any(layer.sampled or not layer.complete for layer in layers):
+        if not all(leg.closed for leg in search.legs):
             return None
         bound, nodes = LeastChain([leg.least_costs for leg in search.legs], cycle.closed).find()
         return bound if nodes else None
