@@ -55,7 +55,7 @@ def with_neighbours(cycle: Cycle, found: CycleSolution, step: float) -> Cycle:
         found: solution with the configurations.
         step: step of the tool [rad]; a posture moves by a share of it.
     """
-    at, around = _visited(found), _configurations_around(found)
+    at, around = visited_configurations(found), _configurations_around(found)
     stops = [
         stop if stop.path else _with_neighbours(cycle, stop, at[stop.name], around[stop.name], step)
         for stop in cycle.stops
@@ -100,19 +100,18 @@ def _with_neighbours(cycle: Cycle, stop: Stop, q: Array, around: list[Array], st
     return stop
 
 
-def _visited(found: CycleSolution) -> dict[str, Array]:
-    """Joint positions (nq,) [rad] at all places of a cycle in order of visit, by name."""
+def visited_configurations(found: CycleSolution) -> dict[str, Array]:
+    """Joint positions (nq,) [rad] at all places of a cycle in order of visit, by their names."""
     at = {START: found.moves[0].solution.start.q}
     for move in found.moves:
         at |= {each.stop: each.q for each in move.passes}
-        if move.planned.goal != START:
-            at[move.planned.goal] = move.solution.goal.q
+        at.setdefault(move.planned.goal, move.solution.goal.q)
     return at
 
 
 def _configurations_around(found: CycleSolution) -> Mapping[str, list[Array]]:
     """Joint positions (nq,) [rad] at the places before and after every place of a cycle."""
-    visited = list(_visited(found).items())
+    visited = list(visited_configurations(found).items())
     if found.moves[-1].planned.goal == START:
         visited.append((START, found.moves[-1].solution.goal.q))
     around: dict[str, list[Array]] = {name: [] for name, _ in visited}

@@ -268,8 +268,7 @@ class _CycleBoxes:
         for axis, side in zip(space.axes, half, strict=True):
             sides[axis.body, COORDINATES.index(axis.name)] = side
         # the row of zeros is that of a body that does not move
-        base = next((k for k, each in enumerate(space.placement.moved) if each.moves == "base"), -1)
-        body = self.body_of_stop(name)
+        base, body = space.base_body, self.body_of_stop(name)
         k = -1 if body is None else body
         shift, turns = sides[base, :3] + sides[k, :3], [sides[base, 3], sides[k, 3]]
         R_world_base = space.base(place)[:3, :3]

@@ -49,7 +49,6 @@ class Extents:
     def __init__(self, space: Space) -> None:
         self.space = space
         moved = space.placement.moved
-        self._of_base = next((k for k, each in enumerate(moved) if each.moves == "base"), None)
         self._of_stop = {
             name: k
             for k, each in enumerate(moved)
@@ -63,11 +62,11 @@ class Extents:
 
     def of_base(self, point: Array) -> Extent:
         """The box of a point (3,) [m] of the base frame."""
-        if self._of_base is None:
+        if self.space.base_body < 0:
             T = self.space.placement.base
             at = T[:3, :3] @ point + T[:3, 3]
             return Extent(at, at)
-        return self._of_body(self._of_base, point)
+        return self._of_body(self.space.base_body, point)
 
     def of_stop(self, stop: str, point: Array) -> Extent:
         """The box of a point (3,) [m], given in the world, on the body of a stop."""

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.newton import solved
 from joulepath.optimizer.kinematics.tcp import flange_pose, tcp_pose
@@ -57,15 +56,6 @@ class Visited:
 
     q: Mapping[str, Array]
     T_base_stop: Mapping[str, Array]
-
-    @classmethod
-    def of(cls, found: CycleSolution, T_base_stop: Mapping[str, Array]) -> Visited:
-        """The configurations of a found cycle."""
-        q = {START: found.moves[0].solution.start.q}
-        for move in found.moves:
-            q |= {each.stop: each.q for each in move.passes}
-            q.setdefault(move.planned.goal, move.solution.goal.q)
-        return cls(q, T_base_stop)
 
 
 def nearby_cycle(cycle: Cycle, visited: Visited, T_base_stop: Mapping[str, Array]) -> Cycle | None:

@@ -13,6 +13,7 @@ from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.cycle.errors import CycleTooShort, NoSequence
 from joulepath.optimizer.cycle.known_motions import KnownMotions, knowing
+from joulepath.optimizer.cycle.neighbouring_configurations import visited_configurations
 from joulepath.optimizer.deadline import Clock, Deadline
 from joulepath.optimizer.exceptions import (
     DeadlineExceeded,
@@ -211,7 +212,7 @@ class Rounds:
         bound = sum(
             weight * each.lower_bound for weight, each in zip(self.weights, found, strict=True)
         )
-        visited = map(Visited.of, found, self.space.stops(place))
+        visited = map(Visited, map(visited_configurations, found), self.space.stops(place))
         return Round(place, energy, tuple(found), bound=bound, visited=tuple(visited))
 
     @property

@@ -144,21 +144,20 @@ class Space:
             poses.append(body.pose(choice[k], values))
         return Place(choice, np.array(x, dtype=float), tuple(poses))
 
+    @cached_property
+    def base_body(self) -> int:
+        """Number of the base among the movable bodies; -1 for a base that does not move."""
+        moved = self.placement.moved
+        return next((k for k, each in enumerate(moved) if each.moves == "base"), -1)
+
     def mount(self, place: Place) -> Mount | None:
         """The mount of the base at a place; None without a mount."""
-        for moved, body, choice in zip(
-            self.placement.moved, self.bodies, place.choice, strict=True
-        ):
-            if moved.moves == "base" and body.mounts:
-                return body.mounts[choice]
-        return None
+        k = self.base_body
+        return self.bodies[k].mounts[place.choice[k]] if k >= 0 and self.bodies[k].mounts else None
 
     def base(self, place: Place) -> Array:
         """Pose (4, 4) of the base in the world at a place."""
-        for moved, pose in zip(self.placement.moved, place.poses, strict=True):
-            if moved.moves == "base":
-                return pose
-        return self.placement.base
+        return place.poses[self.base_body] if self.base_body >= 0 else self.placement.base
 
     def cycles(self, place: Place) -> list[Cycle]:
         """The cycles at a place, in the frame of the base."""
