@@ -15,7 +15,7 @@ from joulepath.optimizer.cycle.lazy_search import LAZY_SEARCH, LazySearch, Pair
 from joulepath.optimizer.cycle.legs import Leg, check_size
 from joulepath.optimizer.cycle.move_problem import problem_of
 from joulepath.optimizer.cycle.pair_solver import PAIR_SOLVER, PairSolver
-from joulepath.optimizer.cycle.passing_leg import PASSING, PassingLeg
+from joulepath.optimizer.cycle.passing_leg import PassingLeg
 from joulepath.optimizer.cycle.rest_energy import dwell_costs
 from joulepath.optimizer.cycle.stop_layers import layers_of
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
@@ -44,10 +44,8 @@ class CycleSearchSettings:
 
     reserved_share: float = 0.3
     """Share of the deadline left to the motions of the answer."""
-    most_routes: int = 3
-    """Routes through passes tried for a pair."""
-    most_failed_routes: int = 10
-    """Routes through passes tried for a pair while none has a motion."""
+    most_routes: int = 10
+    """Routes through passes tried for a pair until one has a motion."""
     many_stops: int = 40
     """Number of stops above which unsolved pairs weigh more than their bounds: the proof that no
     chain is better then takes more time than it is worth."""
@@ -208,38 +206,25 @@ class CycleSearch(LazySearch):
             self._tell(Improved(energy, own, self._proven_bound))
 
     def _attempt_routes(self, leg: PassingLeg, k: int, s: int, g: int) -> float | None:
-        """Least result of `_attempt` over the likeliest routes of a pair.
+        """Result of `_attempt` for the first route of a pair with a motion, the likeliest first.
 
-        The route of a known stopping motion is tried first.
+        The route of a known stopping motion is tried before all others.
         """
-        pair, best, kept = (k, s, g), None, None
-        stopping = self.solver.stopping_route(pair)
+        stopping, energy = self.solver.stopping_route((k, s, g)), None
         first = [] if stopping is None else [(-np.inf, stopping)]
         others = (other for other in leg.best_routes(s, g) if other[1] != stopping)
         for tried, (bound, route) in enumerate(chain(first, others)):
-            known = np.inf if best is None else best
-            if np.isfinite(known) and bound >= known:
-                break
-            solved = np.isfinite(known)
-            most = CYCLE_SEARCH.most_routes if solved else CYCLE_SEARCH.most_failed_routes
-            if tried >= most or PASSING.likely_ratio * bound >= known:
-                self._skipped_routes = True
+            known = np.inf if energy is None else energy
+            enough = np.isfinite(known) or tried == CYCLE_SEARCH.most_routes
+            if enough or (tried and self.search_end.passed):
+                self._skipped_routes |= bound < known
                 break
             leg.set_route(s, g, route)
-            energy = self._attempt(*pair)
+            energy = self._attempt(k, s, g)
             if energy is None:
                 self._skipped_routes = True
                 break
-            if best is None or energy < best:
-                best, kept = energy, (route, self._runs.pop(pair, None))
-            if self.search_end.passed:
-                self._skipped_routes = True
-                break
-        if kept is not None:
-            leg.set_route(s, g, kept[0])
-            if kept[1] is not None:
-                self._runs[pair] = kept[1]
-        return best
+        return energy
 
     def _time_of_attempt(self, k: int) -> float:
         """Time for a first motion of leg `k` [s]."""
