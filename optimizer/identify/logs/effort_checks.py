@@ -9,7 +9,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.errors import EffortNotUsable
-from joulepath.optimizer.identify.logs.lag import smooth, without_spikes
+from joulepath.optimizer.identify.logs.lag import jackknife_sd, smooth, without_spikes
 from joulepath.optimizer.identify.logs.log import EffortMeaning
 from joulepath.optimizer.identify.logs.log_warnings import named_joints
 from joulepath.optimizer.identify.logs.motion import LoggedMotion, smooth_sign, thinned
@@ -110,18 +110,12 @@ def _regression(joint: int, rigid: Array, v: Array, a: Array, effort: Array) -> 
     return JointEffort(
         joint=joint,
         slope=float(values[0, 0]),
-        slope_sd=_jackknife_sd(values[1:, 0]),
+        slope_sd=jackknife_sd(values[1:, 0]),
         friction=float(friction[0]),
-        friction_sd=_jackknife_sd(friction[1:]),
+        friction_sd=jackknife_sd(friction[1:]),
         share=1 - float(error @ error) / square if square > 0 else 1.0,
         weight=float(independent.std()),
     )
-
-
-def _jackknife_sd(parts: Array) -> float:
-    """Jackknife standard deviation from the values (blocks,) with one block left out."""
-    count = EFFORT_CHECKS.blocks
-    return float(np.sqrt((count - 1) / count * ((parts - parts.mean()) ** 2).sum()))
 
 
 def check_signs(found: Sequence[JointEffort], names: Sequence[str]) -> None:

@@ -146,8 +146,12 @@ def _common_lag(channels: Sequence[_Channel], rate: float) -> float:
     fine = fine[np.abs(fine) <= edge]
     lags = np.array([_minimum(fine, each) for each in _log_errors(channels, fine)]) / rate
     lag, parts = float(lags[0]), lags[1:]
-    sd = np.sqrt((LAG.blocks - 1) / LAG.blocks * float(((parts - parts.mean()) ** 2).sum()))
-    return lag if abs(lag) >= max(LAG.min_lag, LAG.min_deviations * sd) else 0.0
+    return lag if abs(lag) >= max(LAG.min_lag, LAG.min_deviations * jackknife_sd(parts)) else 0.0
+
+
+def jackknife_sd(parts: Array) -> float:
+    """Jackknife standard deviation from the values (blocks,) with one block left out."""
+    return float(np.sqrt((len(parts) - 1) / len(parts) * ((parts - parts.mean()) ** 2).sum()))
 
 
 def _minimum(shifts: Indices, error: Array) -> float:

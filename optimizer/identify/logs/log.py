@@ -121,7 +121,7 @@ class Log:
     def cycle_rows(self) -> Indices:
         """First row of each cycle of a repetitive log, and the end of the last cycle; empty if the
         motion does not repeat."""
-        return cycle_edges(self.q, self.v, self._rest, self.rate, self._moves_and_rests)
+        return cycle_edges(self.q, self.v, self.rests, self.rate, self._moves_and_rests)
 
     @property
     def segment_rows(self) -> list[int]:
@@ -139,7 +139,7 @@ class Log:
         return [0, *(row for row in begins if 0 < row < last), last]
 
     @property
-    def _rest(self) -> Mask:
+    def rests(self) -> Mask:
         """Whether the arm rests (n,)."""
         rest = np.zeros(len(self.time), dtype=bool)
         for move in self.moves:

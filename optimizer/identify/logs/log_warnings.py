@@ -92,9 +92,7 @@ def _constant(log: Log) -> Iterator[str]:
 def _saturated(log: Log) -> Iterator[str]:
     if log.effort is None:
         return
-    moving = np.zeros(len(log.effort), dtype=bool)
-    for move in log.moves:
-        moving[move.start : move.end] = not move.at_rest
+    moving = ~log.rests
     # joint by joint, because a log can fill half of the memory
     wrong = [joint for joint, effort in enumerate(log.effort.T) if _is_saturated(effort, moving)]
     if wrong:

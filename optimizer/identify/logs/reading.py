@@ -285,13 +285,14 @@ def _channels(log: Log, columns: Columns, effort: ChannelName | None) -> Iterato
         columns: columns of the file.
         effort: group of columns of the efforts.
     """
-    units = _UNITS | {"effort": _EFFORT_UNITS.get(log.effort_meaning or "", "")}
+    units = _UNITS | {"effort": _EFFORT_UNITS.get(log.effort_meaning or "", ""), "wrench": "N"}
     sources: dict[str, ChannelName | None] = {
         "q": "q",
         "v": "v",
         "a": "a",
         "effort": effort,
         "temperature": "temperature",
+        "wrench": "wrench",
     }
     for name, group in sources.items():
         values: Array | None = getattr(log, name)
@@ -302,17 +303,8 @@ def _channels(log: Log, columns: Columns, effort: ChannelName | None) -> Iterato
             if np.isnan(values[0, j]):
                 continue
             column = None if indices is None else columns.names[indices[j]]
-            yield Channel(f"{name}{j + 1}", column, units[name], *_range(values[:, j]), float(size))
-    if log.wrench is not None:
-        for j, size in enumerate(noise(log.wrench, log.rate)):
-            column = columns.names[columns.groups["wrench"][j]]
-            yield Channel(
-                f"wrench{j + 1}",
-                column,
-                "N" if j < 3 else "N·m",
-                *_range(log.wrench[:, j]),
-                float(size),
-            )
+            unit = "N·m" if name == "wrench" and j >= 3 else units[name]
+            yield Channel(f"{name}{j + 1}", column, unit, *_range(values[:, j]), float(size))
     if log.power is not None:
         column = " · ".join(columns.names[k] for k in columns.groups["power"])
         (size,) = noise(log.power[:, None], log.rate)
