@@ -11,6 +11,7 @@ import numpy as np
 from joulepath.optimizer.bounds.missed_branches import all_branches_known
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.motion.spline import Spline, lasting, sampled
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.attempts import solve_from, solver_of
 from joulepath.optimizer.search.candidates import Candidate, Reason
@@ -105,8 +106,8 @@ def fastest(
 ) -> Fastest | None:
     """The fastest motion over all candidates; None if none is found.
 
-    The search disregards the allowed durations of the problem. The motion is at least as fast as
-    all known motions with a valid certificate.
+    The search disregards the allowed durations of the problem, up to `DURATIONS.longest`. The
+    motion is at least as fast as all known motions with a valid certificate.
 
     Args:
         state: state of the search.
@@ -114,7 +115,7 @@ def fastest(
         wanted: sufficient duration [s]; None for the fastest motion.
     """
     settings = FastestSettings()
-    open_candidates = _tried(state)
+    open_candidates = [each for each in _tried(state) if each.shortest <= DURATIONS.longest]
     searches, cut_short = list[_FastestOfCandidate](), False
     # proven least duration above which a candidate cannot matter
     enough = np.inf

@@ -76,6 +76,15 @@ def test_the_shortest_duration_is_nearly_the_seven_segments() -> None:
         assert least * (1 - ROUNDING) <= refusal.value.shortest < 1.02 * least
 
 
+def test_a_motion_of_hours_is_told_to_be_too_slow() -> None:
+    """Ruckig gives up motions of more than two hours."""
+    slow = limits(v_max=1e-4)
+    with pytest.raises(DurationTooShort) as refusal:
+        optimize(problem(limits=slow, objective="mechanical", duration_max=600.0))
+    assert refusal.value.bound >= np.abs(GOAL - START).max() / 1e-4
+    assert refusal.value.shortest is None
+
+
 def test_no_time_at_all_is_a_deadline_exceeded() -> None:
     clock = CountingClock()
     with pytest.raises(DeadlineExceeded) as refusal:
