@@ -169,3 +169,18 @@ def lasting(spline: Spline, duration: float) -> Spline:
         if duration == spline.duration
         else replace(spline, knots=spline.knots / spline.duration * duration)
     )
+
+
+def resting_until(spline: Spline, duration: float) -> Spline:
+    """The motion with a rest at its goal until `duration` [s], which is longer than the motion.
+
+    The motion ends at rest, so q, v and a are continuous at the knot of multiplicity degree - 2.
+    """
+    end = spline.degree + 1
+    tail = [spline.duration] * (spline.degree - 2) + [duration] * end
+    rest = np.repeat(spline.control_points[-1:], spline.degree - 2, axis=0)
+    return replace(
+        spline,
+        knots=np.concatenate([spline.knots[:-end], tail]),
+        control_points=np.concatenate([spline.control_points, rest]),
+    )

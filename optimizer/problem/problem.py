@@ -141,6 +141,11 @@ class Problem:
         """Whether only one duration is allowed."""
         return self.duration_min is not None and self.duration_min == self.duration_max
 
+    @property
+    def may_rest(self) -> bool:
+        """Whether the method's motions may rest at their ends."""
+        return self.method == "bspline" and self.tool_path is None and not self.passes
+
 
 def narrowed(problem: Problem, start: int, goal: int) -> Problem:
     """The problem with a single start and goal: those of the given indices."""

@@ -287,7 +287,11 @@ class _LeastWorkSearch:
         state.cut_short |= result.cut_short
         if result.spline is not None:
             state.accept_if_better(candidate, result, state.prepared.energy(result.spline))
-        elif not is_dense and result.status in (SolveStatus.FAILED, SolveStatus.PRUNED):
+        elif (
+            candidate.energy is None
+            and not is_dense
+            and result.status in (SolveStatus.FAILED, SolveStatus.PRUNED)
+        ):
             candidate.attempt = result
             candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.message)
         if candidate.status is not CandidateStatus.UNVISITED:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from joulepath.optimizer.bounds.missed_branches import all_branches_known
 from joulepath.optimizer.deadline import DeadlinePassed, checkpoint, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
+from joulepath.optimizer.motion.spline import Spline, resting_until
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.solution import Solution
@@ -21,14 +22,16 @@ from joulepath.optimizer.search.exploration import explore
 from joulepath.optimizer.search.fastest import explore_or_find_fastest, find_fastest
 from joulepath.optimizer.search.free_members import bounded
 from joulepath.optimizer.search.freed_duration import start_from_free_duration
+from joulepath.optimizer.search.moving_time import coarse_swing
 from joulepath.optimizer.search.no_trajectory import no_motion
 from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.other_ways import explore_other_ways
+from joulepath.optimizer.search.outer_turns import families_of
 from joulepath.optimizer.search.path_ends import path_candidates
 from joulepath.optimizer.search.refinement import refine, refine_rivals
 from joulepath.optimizer.search.resting_posture import rest_on_the_way
 from joulepath.optimizer.search.sampled_ends import between
-from joulepath.optimizer.search.state import FoundMotion, SearchState
+from joulepath.optimizer.search.state import DURATION_TOLERANCE, FoundMotion, SearchState
 from joulepath.optimizer.search.tightened_limits import retry_within_tighter_limits
 from joulepath.optimizer.search.warm_start import warm_start
 from joulepath.optimizer.search.waypoint_baselines import waypoint_baselines
@@ -82,9 +85,6 @@ def solve_without_storage(state: SearchState) -> None:
 
 def explore_candidates(state: SearchState) -> None:
     """Solve candidates by their bounds; take the fastest motion if no motion is short enough."""
-    problem = state.problem
-    # rest does no work: any motion may rest for the remaining time
-    state.may_rest = problem.objective == "mechanical" and not problem.has_fixed_duration
     explore_or_find_fastest(state, lambda: explore(state), state.known, state.without_storage)
 
 
@@ -109,16 +109,40 @@ def refine_best(state: SearchState) -> None:
     start_from_free_duration(state, state.best() or best)
 
 
-def solve_longest_duration(state: SearchState) -> None:
-    """Compare with the motion of the longest duration, once."""
-    longest = None
-    if state.may_rest:
-        longest = solve_related(
-            state, replace(state.problem, duration_min=state.problem.duration_max)
-        )
-    if longest is not None:
-        state.accept_if_better(longest.candidate, longest.result, longest.energy)
-    state.may_rest = False
+def solve_other_durations(state: SearchState) -> None:
+    """Compare with motions of least mechanical work of other durations, once.
+
+    Rest does no work: a motion may take less than a given time, and a motion of free duration may
+    take the longest time, which the smoothed work, positive at rest, makes seem dear. The searches
+    for a free and for a given duration also differ, and end in other local minima.
+    """
+    problem, best = state.problem, state.best()
+    is_sought = problem.objective == "mechanical" and not state.known
+    if not is_sought or state.other_durations_solved or best is None:
+        return
+    state.other_durations_solved, longest = True, problem.duration_max
+    if not problem.has_fixed_duration:
+        _accept(state, solve_related(state, replace(problem, duration_min=longest)))
+    elif problem.may_rest and families_of(state):
+        # between sliding ends, the search for a free duration found nothing better
+        _accept(state, solve_related(state, replace(problem, duration_min=None)))
+    swing = coarse_swing(state, state.best() or best) if problem.may_rest else None
+    if swing is None:
+        return
+    time = swing.spline.duration
+    given = replace(problem, duration_min=time, duration_max=time)
+    # an incumbent keeps the search from motions that need less once their corners are sharp
+    for known in ((), (swing.spline,)):
+        found = solve_related(state, given, known=known)
+        _accept(state, found)
+        if found is not None and found.energy.mechanical.total <= swing.work:
+            return
+
+
+def _accept(state: SearchState, found: FoundMotion | None) -> None:
+    """Accept the motion of a related problem if it needs less energy."""
+    if found is not None:
+        state.accept_if_better(found.candidate, found.result, found.energy)
 
 
 def compare_best_with_baselines(state: SearchState) -> None:
@@ -175,7 +199,7 @@ SEARCH: tuple[Stage, ...] = (
     refine_sampled_ends,
     until_confirmed(
         refine_best,
-        solve_longest_duration,
+        solve_other_durations,
         compare_best_with_baselines,
         confirm_best,
     ),
@@ -211,13 +235,18 @@ def search(state: SearchState) -> Solution:
     raise no_motion(state)
 
 
-def solve_related(state: SearchState, problem: Problem, share: float = 1.0) -> FoundMotion | None:
+def solve_related(
+    state: SearchState, problem: Problem, share: float = 1.0, known: Sequence[Spline] = ()
+) -> FoundMotion | None:
     """Solve a related problem; its motions must be feasible in the own problem at no more energy.
+
+    Motions that are too short rest at the goal for the remaining time.
 
     Args:
         state: state of the search.
         problem: the related problem.
         share: share of the time left for the related search.
+        known: motions to start from.
 
     Returns:
         The motion with its energy in the own problem; None if there is none in time.
@@ -226,10 +255,12 @@ def solve_related(state: SearchState, problem: Problem, share: float = 1.0) -> F
     if left <= 0:
         return None
     other = SearchState.of(
-        replace(problem, bound="normal", deadline=share * left), clock=state.clock
+        replace(problem, bound="normal", deadline=share * left), known, state.clock
     )
+    other.other_durations_solved = state.other_durations_solved
     try:
         prepare(other)
+        start_from_known_motions(other)
         found = search(other)
     except (DeadlineExceeded, DurationTooShort, NoTrajectory):
         return None
@@ -240,7 +271,10 @@ def solve_related(state: SearchState, problem: Problem, share: float = 1.0) -> F
         each for each in state.candidates if (each.start.target, each.goal.target) == targets
     ]
     candidate = between(state.prepared, state.candidates, found.start.q, found.goal.q, same_targets)
-    spline = found.trajectory.spline
+    spline, least = found.trajectory.spline, state.problem.duration_min or 0.0
+    # rounding may make a motion of the least duration a little shorter
+    if spline.duration < least * (1 - DURATION_TOLERANCE):
+        spline = resting_until(spline, least)
     result = SolveResult(
         SolveStatus.SOLVED,
         SolveReason.CONVERGED,

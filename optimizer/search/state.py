@@ -89,8 +89,8 @@ class SearchState:
     """Whether coarse motions of least work have been sought."""
     sliding_work_sought: bool = False
     """Whether least work between sliding ends has been sought."""
-    may_rest: bool = False
-    """Whether the motion of the longest duration is still to be compared."""
+    other_durations_solved: bool = False
+    """Whether motions of least work of other durations have been compared."""
     seeks_baselines: bool = False
     """Whether baselines along planned paths are sought where the usual ones break a limit."""
     baselines: list[Baseline] = field(default_factory=list)

@@ -11,6 +11,7 @@ from joulepath.optimizer.motion.spline import (
     lasting,
     least_time_scale,
     peak_rates,
+    resting_until,
     retimed,
     time_scale,
     time_scales,
@@ -19,6 +20,8 @@ from tests.optimizer.moves import GOAL, ROBOT, START, limits
 
 MOTION = time_optimal_spline(ROBOT.limits, START, GOAL)
 ROUNDING = 1e-12
+# accelerations, divided differences of positions over spans of some milliseconds [rad/s²]
+OF_RATES = 1e-9
 # relative; peaks of the jerk between samples, in spans other than a quintic at rest
 PEAK = 1e-6
 
@@ -36,6 +39,18 @@ def test_a_duration_is_met_exactly(duration: float) -> None:
 def test_rates_fall_with_powers_of_the_factor() -> None:
     expected = peak_rates(MOTION) / np.array([2.0, 4.0, 8.0])[:, None]
     assert peak_rates(retimed(MOTION, 2.0)) == pytest.approx(expected, rel=PEAK)
+
+
+def test_a_motion_rests_at_its_goal_until_a_time() -> None:
+    longer = resting_until(MOTION, MOTION.duration + 3.0)
+    assert longer.duration == MOTION.duration + 3.0
+    moving = np.linspace(0.0, MOTION.duration, 50)
+    for derivative in range(3):
+        expected = MOTION.curve(moving, derivative)
+        assert longer.curve(moving, derivative) == pytest.approx(expected, abs=OF_RATES)
+    resting = np.linspace(MOTION.duration, longer.duration, 20)
+    assert np.abs(longer.curve(resting) - MOTION.control_points[-1]).max() < ROUNDING
+    assert peak_rates(longer) == pytest.approx(peak_rates(MOTION), rel=PEAK)
 
 
 @pytest.mark.parametrize("given", [{"v_max": 0.5}, {"a_max": 1.0}, {"j_max": 5.0}])
