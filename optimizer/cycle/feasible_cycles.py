@@ -20,6 +20,7 @@ from joulepath.optimizer.cycle.cycle_baselines import (
 )
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleBaselineName, CycleEnergies
+from joulepath.optimizer.cycle.lazy_search import Pair
 from joulepath.optimizer.cycle.time_allocation import total_duration
 from joulepath.optimizer.cycle.timed_cycle import TimedChain, TimedSearch
 from joulepath.optimizer.deadline import DeadlinePassed, watch
@@ -30,6 +31,7 @@ from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.problem.stops import PlannedMove
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.baseline_comparison import NOT_CONFIRMED
+from joulepath.optimizer.search.state import ENERGY_TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -241,9 +243,37 @@ def _solutions(timing: TimedSearch, nodes: list[int], lengths: Sequence[float]) 
     return [
         own[pair]
         if pair in own and own[pair].duration == length
-        else timing.search.solver.solve_in(*pair, length)
+        else _solved_in(timing, pair, length)
         for pair, length in pairs
     ]
+
+
+def _solved_in(timing: TimedSearch, pair: Pair, length: float) -> Solution:
+    """Certified motion of a pair in a duration [s]: no dearer than known faster motions slowed to
+    it.
+    """
+    search, found = timing.search, None
+    cost_of, objective = search.legs[pair[0]].prepared.cost_of, search.cycle.objective
+    slowed = [
+        lasting(each.spline, length) for each in timing.motions_of(pair) if each.duration <= length
+    ]
+    best = min(slowed, key=cost_of, default=None)
+    try:
+        found = search.solver.solve_in(*pair, length)
+    except NoTrajectory:
+        if best is None:
+            raise
+    if best is None or (
+        found is not None and found.energy.of(objective) <= cost_of(best) * (1 + ENERGY_TOLERANCE)
+    ):
+        assert found is not None
+        return found
+    try:
+        return search.solver.solve_in(*pair, length, [best])
+    except (NoTrajectory, DeadlineExceeded):
+        if found is None:
+            raise
+        return found
 
 
 def simple_cycles(

@@ -92,7 +92,9 @@ class PairSolver:
         """
         return self.run(k, self.problem((k, s, g), self.end.left)).as_it_is(motion)
 
-    def solve_in(self, k: int, s: int, g: int, duration: float) -> Solution:
+    def solve_in(
+        self, k: int, s: int, g: int, duration: float, guesses: Sequence[Spline] = ()
+    ) -> Solution:
         """Certified motion of a pair in a given duration.
 
         Args:
@@ -100,6 +102,7 @@ class PairSolver:
             s: node at the start.
             g: node at the goal.
             duration: duration of the motion [s].
+            guesses: known motions, of any duration, to start from.
 
         Raises:
             JoulepathError: the errors of `optimize`.
@@ -108,7 +111,7 @@ class PairSolver:
         kept = PAIR_SOLVER.kept_share * self.cycle.deadline
         problem = self.problem(pair, self.end_of_leg(k, kept).left)
         fixed = replace(problem, duration_min=duration, duration_max=duration)
-        own, known = self.solutions.get(pair), [*self.guesses(*pair)]
+        own, known = self.solutions.get(pair), [*self.guesses(*pair), *guesses]
         if own is not None and self.moves[k].tool_path is not None:
             # a path followed nearly as fast as possible is not found again without a guess
             known.append(own.trajectory.spline)

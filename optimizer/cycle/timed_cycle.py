@@ -106,7 +106,7 @@ class TimedSearch:
             NoTrajectory: a move has no motion.
             DeadlineExceeded: the time is up.
         """
-        best = None if nodes is None else self._allocated(nodes)
+        best = self._from_own_motions(nodes) if nodes is not None else None
         if best is None:
             best = self._from_fastest()
         with suppress(DeadlineExceeded, NoSequence):
@@ -128,6 +128,31 @@ class TimedSearch:
                 best = other
         self.exact = False
         return best
+
+    def _from_own_motions(self, nodes: list[int]) -> TimedChain | None:
+        """A chain with its time allocated, or with its known motions if there is no time for it."""
+        if self.search.search_end.passed and (known := self.with_known_motions(nodes)) is not None:
+            return known
+        try:
+            found = self._allocated(nodes)
+        except DeadlineExceeded:
+            found = None
+        return self.with_known_motions(nodes) if found is None else found
+
+    def with_known_motions(self, nodes: list[int]) -> TimedChain | None:
+        """A chain with its known motions and a wait; None if the motions take too long."""
+        found = [self.search.solutions[pair] for pair in self.search.pairs(nodes)]
+        durations = [solution.duration for solution in found]
+        moving = sum(solution.energy.of(self.cycle.objective) for solution in found)
+        waited = self.time - sum(durations)
+        if waited < 0 or not self._rests_count:
+            return None
+        self.exact = False
+        wait_after, wait = self.cheapest_wait(nodes, waited)
+        price = -self.waiting_power(nodes, wait_after)
+        energy = moving + wait + self.search.dwells(nodes)
+        allocation = Allocation(price, durations, moving, waited)
+        return TimedChain(nodes, allocation, wait_after, wait, energy)
 
     @property
     def _fast_search(self) -> PricedSearch:
