@@ -154,9 +154,10 @@ def delete(session: Session, answer_id: str, client: Client) -> None:
 
 
 def prune(session: Session, max_bytes: int, max_age: timedelta) -> None:
-    """Deletes answers without study or job: older than `max_age`, then those above `max_bytes`, the
-    oldest ones of the clients with most bytes: no client can displace the answers of another one
-    that has less.
+    """Deletes answers without study or job: those older than `max_age`, then the oldest answers of
+    the clients with most bytes, until the rest has at most `max_bytes`.
+
+    A client keeps all its answers if they have at most an equal share of `max_bytes`.
     """
     free = and_(Answer.study_id.is_(None), Answer.job_id.is_(None))
     session.execute(delete_from(Answer).where(free, Answer.created < now() - max_age))

@@ -17,8 +17,8 @@ _LIGHT = defer(StoredLog.body, raiseload=True)
 
 
 def add(session: Session, log: StoredLog, most: int) -> None:
-    """Adds a log. Raises TooManyLogs if all logs together would exceed `most` bytes, or those of
-    the owner its share of them."""
+    """Adds a log. Raises TooManyLogs if all logs would exceed `most` bytes, or if the owner's logs
+    would exceed the owner's share of `most`."""
     if log.size > room_of(session, log.owner, most, StoredLog.owner, func.sum(StoredLog.size))[0]:
         raise TooManyLogs(most)
     session.add(log)

@@ -1,4 +1,4 @@
-"""Shares of clients in what the database may hold, and their idempotency keys."""
+"""Shares of API keys in the database, and the stored form of idempotency keys."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ def room_of(
     amount: ColumnElement[int],
     *which: ColumnElement[bool],
 ) -> tuple[int, int]:
-    """What a client may still add, and what all clients together may add.
+    """How much a client may add, and how much all clients together may add.
 
-    A client may hold at most half of what the others leave, so that there is always room for
-    another client. Without API keys, there is one client, and everything is its share.
+    A client may hold half of what the others leave, rounded up. As long as two rows or bytes are
+    left, one client cannot take both. Without API keys, there is one client without a share.
 
     Args:
         session: session of the database.
-        owner: the client; None without API keys.
+        owner: name of the client; None without API keys.
         most: largest total of all clients.
         whose: column with the owners of the rows.
-        amount: aggregate that is limited, such as their number.
-        which: conditions of the rows that count.
+        amount: aggregate of the rows that is limited, such as `COUNT`.
+        which: conditions of the counted rows.
     """
     rows = session.execute(select(whose, amount).where(*which).group_by(whose))
     held: dict[str | None, int] = dict(rows.all())
@@ -41,6 +41,5 @@ COUNT = func.count()
 
 
 def stored_key(key: str, owner: str | None) -> str:
-    """The form in which the database keeps an `Idempotency-Key`: clients choose their keys without
-    knowledge of each other's."""
+    """The stored form of an `Idempotency-Key`: equal keys of two clients differ."""
     return key if owner is None else hashlib.sha256(f"{owner} {key}".encode()).hexdigest()

@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+import numpy as np
 import pytest
-from sqlalchemy import select, text
+from sqlalchemy import func, select, text
 from sqlalchemy.orm import Session
 
 from joulepath.app.exceptions.queue import TooManyWaiting, TooManyWaitingOfClient
@@ -74,6 +75,25 @@ async def test_answers_of_a_client_with_few_outlive_a_flood(store: Store) -> Non
     await store.write(partial(answers.prune, max_bytes=3 * size, max_age=A_DAY))
     left = await store.read(lambda session: set(session.scalars(select(Answer.id))))
     assert left == {kept, *flood[-2:]}
+
+
+async def test_a_client_with_an_equal_share_loses_no_answer(store: Store) -> None:
+    """Whatever the sizes of its answers and of those of the others."""
+    rng, owned = np.random.default_rng(0), dict[str, list[str]]()
+    for owner, count, largest in ("cell", 3, 900), ("press", 30, 60), ("dock", 12, 300):
+        bodies = [rng.bytes(int(size)) for size in rng.integers(1, largest, count)]
+        owned[owner] = [await store.write(partial(put, body=b, owner=owner)) for b in bodies]
+    of_owner = select(Answer.owner, func.sum(Answer.size)).group_by(Answer.owner)
+    sizes: dict[str | None, int] = await store.read(
+        lambda session: dict(session.execute(of_owner).all())
+    )
+    least = min(sizes, key=lambda owner: sizes[owner])
+    most = len(sizes) * sizes[least]
+    assert most < sum(sizes.values())
+    await store.write(partial(answers.prune, max_bytes=most, max_age=A_DAY))
+    left = await store.read(lambda session: set(session.scalars(select(Answer.id))))
+    assert least is not None and set(owned[least]) <= left
+    assert len(left) < sum(map(len, owned.values()))
 
 
 async def test_clients_choose_their_keys_independently(store: Store) -> None:
