@@ -174,8 +174,7 @@ def _ruckig(limits: Limits, q_start: Array, q_goal: Array) -> ruckig.Trajectory:
         trajectory = ruckig.Trajectory(len(q_start))
         try:
             result = ruckig.Ruckig(len(q_start)).calculate(parameters, trajectory)
-        except (ruckig.RuckigError, ValueError) as error:
-            # the Python enumeration lacks the result for durations of more than two hours
+        except ruckig.RuckigError as error:
             result = error
         if result in (ruckig.Result.Working, ruckig.Result.Finished):
             return trajectory

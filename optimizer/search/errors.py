@@ -17,6 +17,7 @@ from joulepath.optimizer.declared import (
 )
 from joulepath.optimizer.exceptions import MOST_LISTED, JoulepathError, NoTrajectory
 from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
+from joulepath.optimizer.problem.problem import DURATIONS
 
 
 @dataclass(frozen=True)
@@ -219,6 +220,11 @@ class DurationTooShort(JoulepathError):
         )
         if self.shortest is None:
             found = "No motion"
+            if self.bound > DURATIONS.longest:
+                return (
+                    f"Every motion takes at least {rounded_up(self.bound)} s, and none may take "
+                    f"more than {DURATIONS.longest:g} s: relax a limit."
+                )
             if self.bound:
                 found = f"Every motion takes at least {rounded_up(self.bound)} s, and none"
             message = (
