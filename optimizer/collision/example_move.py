@@ -54,7 +54,7 @@ EXAMPLE = ExampleSettings()
 
 @dataclass(frozen=True)
 class ExampleMove:
-    """Joint positions (nq,) [rad] at both ends of a move without collisions between links."""
+    """Joint positions (nq,) [rad] of a move at whose ends no links collide."""
 
     start: Array
     goal: Array
@@ -62,10 +62,11 @@ class ExampleMove:
 
 @lru_cache(maxsize=MOST_ROBOTS)
 def example_move(robot: Robot) -> ExampleMove | None:
-    """A move of the robot about its first axis, with the flange pointing down in front of the arm.
+    """A move about the first axis. At its ends, no links collide, and the flange is preferably in
+    front of the arm and points down. Postures between the ends are not checked.
 
     Returns:
-        The move; None if the links overlap in all of the best postures.
+        The move; None if links collide in all checked postures.
     """
     model = CollisionModel(Arm(robot=robot))
     postures = _postures(robot)

@@ -112,9 +112,10 @@ def refine_best(state: SearchState) -> None:
 def solve_other_durations(state: SearchState) -> None:
     """Compare with motions of least mechanical work of other durations, once.
 
-    Rest does no work: a motion may take less than a given time, and a motion of free duration may
-    take the longest time, which the smoothed work, positive at rest, makes seem dear. The searches
-    for a free and for a given duration also differ, and end in other local minima.
+    Rest does no work. A motion may therefore be shorter than a fixed duration, and rest for the
+    remaining time. A free duration may be the longest one, although the NLP's smoothed work is
+    positive at rest, and solves with a free duration end too early. Searches with a free and with
+    a fixed duration also end in different local minima.
     """
     problem, best = state.problem, state.best()
     is_sought = problem.objective == "mechanical" and not state.known
@@ -131,7 +132,8 @@ def solve_other_durations(state: SearchState) -> None:
         return
     time = swing.spline.duration
     given = replace(problem, duration_min=time, duration_max=time)
-    # an incumbent keeps the search from motions that need less once their corners are sharp
+    # the coarse motion starts a second search only if the first finds nothing better: as the
+    # incumbent, it would prune motions that need less work after their corners are sharp
     for known in ((), (swing.spline,)):
         found = solve_related(state, given, known=known)
         _accept(state, found)

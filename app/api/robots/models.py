@@ -91,8 +91,8 @@ class FormBody(Response):
 
 
 class ExampleMove(Response):
-    """A move about the first axis, with the flange pointing down, without collisions between links:
-    for a task without targets."""
+    """A move about the first axis for a task without targets. At its ends, no links collide, and
+    the flange preferably points down."""
 
     start: list[float] = described(
         "Joint positions at its start.", "rad", [0.0, -1.5708, -1.5708, -1.5708, 1.5708, 0.0]

@@ -4,13 +4,9 @@ import { freshName, isObject, listOf, rowsOf, targetAt, targetOf } from "./reque
 import type { Kind, Row } from "./request";
 import type { ApiRequest, Obstacle, Pose, Robot, Stop } from "./types";
 
-// fields that one kind of request has and another one has not, or not in the same meaning
-const OF_BOTH = ["windings"]; // without them, a round leaves out turns that a move takes
-const OF_MOVES = ["goal", "path", "duration", "dwell", "bound", ...OF_BOTH];
-const OF_ROUNDS = [
-  ...["stops", "order", "before", "together", "closed", "time", "hold", "wait"],
-  ...OF_BOTH,
-];
+// fields of one kind of request that the other kind lacks; `windings` has another meaning in it
+const OF_MOVES = ["goal", "path", "duration", "dwell", "bound", "windings"];
+const OF_ROUNDS = "stops order before together closed time hold wait windings".split(" ");
 
 const without = (request: ApiRequest, fields: string[]): ApiRequest =>
   Object.fromEntries(Object.entries(request).filter(([name]) => !fields.includes(name)));
