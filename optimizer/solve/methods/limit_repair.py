@@ -6,6 +6,7 @@ exceed a limit slightly. The NLP is then solved again with the limit tightened.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.collision.clearance_constraint import CLEARANCE, CLEARANCE_CONSTRAINT
+from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.dynamics.limited_torque import limited_parts
 from joulepath.optimizer.dynamics.torque_bound import TORQUE_BOUND, TorqueSamples, torque_bounds
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints
@@ -53,6 +55,10 @@ class LimitRepairSettings:
 
     path_samples: int = 401
     """Instants at which path constraints of a colliding motion are checked."""
+
+    block: int = 5000
+    """Instants at which path constraints are checked at a time: the frames of all links at 1 ms
+    would take a gigabyte for ten minutes."""
 
     path_factor: float = 1.5
     """Multiple of the excess by which the bounds of path constraints are tightened."""
@@ -208,8 +214,11 @@ def path_excess(
             if collision is None
             else in_all_spans(spline.knots, settings.path_samples)
         )
-        q, v, _ = sample(spline, instants)
-        ratio[: len(checked.names)] = checked.ratios(q, v).max(axis=0)
+        for block in np.array_split(instants, math.ceil(len(instants) / settings.block)):
+            checkpoint()
+            q, v, _ = sample(spline, block)
+            found = checked.ratios(q, v).max(axis=0)
+            ratio[: len(found)] = np.maximum(ratio[: len(found)], found)
     excess = ratio - 1
     return np.where(
         excess > -settings.tightening / 4,

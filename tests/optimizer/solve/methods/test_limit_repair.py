@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from typing import Any
 
 import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.dynamics.limited_torque import limited_parts
 from joulepath.optimizer.dynamics.torque_bound import TORQUE_BOUND
 from joulepath.optimizer.motion import bspline, seven_segment
 from joulepath.optimizer.motion.bspline import Basis
-from joulepath.optimizer.motion.spline import Spline, peak_rates, retimed, sample, time_scale
+from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.motion.spline import (
+    Spline,
+    lasting,
+    peak_rates,
+    retimed,
+    sample,
+    time_scale,
+)
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.solve.methods.limit_repair import torque_peaks
-from tests.optimizer.moves import PAYLOAD, START, TILTED, limits, problem
+from joulepath.optimizer.solve.methods.limit_repair import path_excess, torque_peaks
+from tests.optimizer.moves import GOAL, PAYLOAD, START, TILTED, limits, problem
 
 # samples of a motion, finer than the certificate's grid of 1 ms
 SAMPLES = 6_001
+# memory for the check of a motion of a minute [byte]
+MOST_MEMORY = 30e6
 # relative tolerance of torques by the same kernel at other instants
 ROUNDING = 1e-12
 # spread of the control points about START [rad]: short motions have the steepest torques
@@ -53,6 +65,19 @@ def estimate(prepared: PreparedProblem, spline: Spline) -> Array:
     _, _, v, a, tau, _ = prepared.report_samples(spline)
     parts = limited_parts(prepared.arm, tau, v, a)
     return np.asarray(sum(np.abs(part).max(axis=0) for part in parts))
+
+
+def test_a_motion_of_minutes_is_checked_in_little_memory_and_in_time() -> None:
+    """The frames of all links at every millisecond would take 50 MB per minute."""
+    prepared = PreparedProblem.of(problem(tcp_speed=0.25))
+    motion = lasting(time_optimal_spline(limits(), START, GOAL), 60.0)
+    tracemalloc.start()
+    path_excess(prepared, motion, prepared.path, None)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < MOST_MEMORY
+    with pytest.raises(DeadlinePassed), watch(Deadline.after(-1.0)):
+        path_excess(prepared, motion, prepared.path, None)
 
 
 @pytest.mark.parametrize("given", TASKS)
