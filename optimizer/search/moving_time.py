@@ -67,12 +67,13 @@ def coarse_swing(state: SearchState, best: Candidate) -> Swing | None:
 
     Returns:
         The motion; None if a shorter movement hardly promises less work, if the deadline has
-        passed, or if the kernel is not compiled.
+        passed, if the kernel is not compiled, or with constraints along the path, of which coarse
+        motions know nothing.
     """
     settings, shortest = MOVING_TIME, best.shortest
     longest = state.problem.duration_max or best.duration
     ample, found = settings.ample_ratio * shortest, list[Swing]()
-    if longest < settings.long_ratio * shortest:
+    if longest < settings.long_ratio * shortest or state.prepared.path is not None:
         return None
     time = min(settings.ratio * longest, ample)
     while time > settings.least_ratio * shortest:
