@@ -19,7 +19,8 @@ function withCompactExamples({ React }) {
 }
 
 window.ui = SwaggerUIBundle({
-  url: "docs/openapi.json",
+  // whole: Swagger UI finds the pages of the operations from it and the relative server
+  url: new URL("docs/openapi.json", location.href).href,
   dom_id: "#swagger-ui",
   presets: [SwaggerUIBundle.presets.apis, SwaggerUIBundle.SwaggerUIStandalonePreset],
   plugins: [withCompactExamples],
