@@ -90,6 +90,35 @@ def test_projects_are_named_saved_and_opened(
         assert state(page, "project.name") == "New cell"
 
 
+DROPPED = """([name, text]) => {
+    const dataTransfer = new DataTransfer();
+    dataTransfer.items.add(new File([text], name));
+    const drop = new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true });
+    return document.querySelector("#view").dispatchEvent(drop);
+}"""
+
+
+def test_a_file_that_is_dropped_is_opened_or_refused(browser: Browser, service: Server) -> None:
+    """The browser itself would leave the page for the file. What the file holds in other types than
+    a project does not count.
+    """
+    with opened(browser, f"{service.url}/studio", tolerated="is no project") as page:
+        until(page, SHOWN)
+        for name, text, why in (
+            ("photo.png", "\x89PNG", "Save as a file"),
+            ("answer.json", '{"robot": "ur5e", "trajectory": {}}', "It holds an answer"),
+        ):
+            assert page.evaluate(DROPPED, [name, text]) is False
+            expect(page.locator("#problem")).to_contain_text(f"{name} is no project")
+            expect(page.locator("#problem")).to_contain_text(why)
+        assert state(page, "request") == FIRST
+        old = {"name": 5, "request": FIRST, "typed": {"/payload/mass": 5}, "economics": {"box": 3}}
+        assert page.evaluate(DROPPED, ["old.json", json.dumps(old)]) is False
+        expect(page.get_by_label("Name of the project")).to_have_value("old")
+        optimised(page)
+        expect(page.locator("#costs")).to_contain_text("€ a kWh")
+
+
 def test_a_kept_answer_comes_back_as_it_was_typed(browser: Browser, service: Server) -> None:
     """Another browser opens the answer from the list: poses as poses, and numbers digit
     by digit.

@@ -10,6 +10,7 @@ import {
   renameProject,
   saveNow,
 } from "../src/store/persist";
+import { DEFAULT_ECONOMICS } from "../src/store/economics";
 import { openKept } from "../src/store/open";
 import { cellOf, link, presentCell, shared } from "../src/store/share";
 import {
@@ -98,7 +99,6 @@ it("a kept answer that this browser has not asked for comes back as it was typed
     typed: { "/payload/mass": "0,80" } as Record<string, string> | null,
     answer: { id: "answer-9", robot: "ur5e", arm: null, branch },
   };
-  vi.stubGlobal("sessionStorage", { getItem: () => null });
   vi.stubGlobal("fetch", () => Promise.resolve(Response.json(kept)));
   await openKept("answer-9");
   expect([request.value, typed.value]).toEqual([MOVE, { "/payload/mass": "0,80" }]);
@@ -134,6 +134,47 @@ it("a file holds a project or a request", () => {
   expect(cellOf(JSON.stringify(MOVE)).request).toEqual(MOVE);
   expect(cellOf(JSON.stringify(presentCell()))).toEqual(presentCell());
   for (const text of ["3", "[]", "null", "{"]) expect(() => cellOf(text)).toThrow();
+});
+
+it("a file of another program or version is opened as far as it holds a project", () => {
+  const price = { value: 0.3, source: "yours" };
+  const { cycle, carbon, ...defaults } = DEFAULT_ECONOMICS;
+  const read = cellOf(
+    JSON.stringify({
+      name: 5,
+      request: MOVE,
+      typed: { "/payload/mass": 5, "/goal/pose/position/2": "450,0", "/duration": null },
+      economics: { cycle: "6", shift: null, shiftsPerYear: -3, price, carbon: 0.2, box: {} },
+    }),
+  );
+  expect(read).toEqual({
+    request: MOVE,
+    typed: { "/goal/pose/position/2": "450,0" },
+    economics: { ...defaults, cycle, carbon, price },
+  });
+  for (const typed of [3, null, ["a"]])
+    expect(cellOf(JSON.stringify({ request: MOVE, typed, economics: typed }))).toEqual({
+      request: MOVE,
+      typed: {},
+    });
+});
+
+it.each([
+  [{ hello: "world" }, "neither targets nor a robot"],
+  [{ request: [1] }, "neither targets nor a robot"],
+  [{ robot: "ur5e", trajectory: { t: [] } }, "an answer"],
+  [{ robot: "ur5e", legs: [] }, "an answer"],
+])("a file that holds no request is refused: %o", (held, why) => {
+  expect(() => cellOf(JSON.stringify(held))).toThrow(why);
+});
+
+it("the project that was saved last is the first, after a clock was set back", async () => {
+  vi.spyOn(Date, "now").mockReturnValueOnce(Date.now() + 864e5);
+  replaceCell({ project: { id: "v", name: "tomorrow" }, request: MOVE });
+  await saveNow();
+  replaceCell({ project: { id: "w", name: "today" }, request: MOVE });
+  await saveNow();
+  expect((await projects())[0]!.name).toBe("today");
 });
 
 it("a project has another name, whether it is open or not", async () => {

@@ -25,8 +25,10 @@ export function openFile(): void {
 }
 
 export async function readFile(file: File): Promise<void> {
+  let text = "";
   try {
-    const cell = cellOf(await file.text());
+    text = await file.text();
+    const cell = cellOf(text);
     const name = cell.name ?? file.name.replace(/(\.joulepath)?\.json$/, "");
     replaceCell({
       project: { id: newId(), name },
@@ -36,6 +38,23 @@ export async function readFile(file: File): Promise<void> {
     });
     page.value = "cell";
   } catch (error) {
-    tell(new Error(`${file.name} is no project: ${(error as Error).message}`));
+    const why = text.trimStart().startsWith("{")
+      ? (error as Error).message
+      : "choose a file that “Save as a file” wrote, or a request in JSON.";
+    tell(new Error(`${file.name} is no project: ${why}`));
   }
+}
+
+/** A file that is dropped on the cell is opened; elsewhere the browser would leave the page for it. */
+export function followDrops(): void {
+  const isFile = ({ target, dataTransfer }: DragEvent) =>
+    dataTransfer?.types.includes("Files") && !(target as HTMLElement).matches?.("[type=file]");
+  document.addEventListener("dragover", (event) => isFile(event) && event.preventDefault());
+  document.addEventListener("drop", (event) => {
+    if (!isFile(event)) return;
+    event.preventDefault();
+    const file = event.dataTransfer!.files[0];
+    if (file && page.value === "cell" && !document.querySelector("dialog[open]"))
+      void readFile(file);
+  });
 }

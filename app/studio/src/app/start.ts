@@ -3,6 +3,7 @@ import { play } from "../picture/clock";
 import { followRobot } from "../picture/pictured";
 import { followAdvice } from "../answer/advice";
 import { followPostures } from "../answer/postures";
+import { followDrops } from "./files";
 import { followHistory } from "./history";
 import { alone, embedded } from "../store/alone";
 import { openCell, openFirst, openKept, openLast } from "../store/open";
@@ -24,6 +25,7 @@ export async function start(): Promise<void> {
   followPostures();
   followAdvice();
   followHistory();
+  followDrops();
   window.addEventListener(
     "hashchange",
     () => /^#(r|answer)=/.test(location.hash) && location.reload(),

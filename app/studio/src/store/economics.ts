@@ -1,4 +1,5 @@
 // What a motion costs: joules to kWh, money and CO₂e, with every assumption named.
+import { isObject } from "./request";
 
 export interface Sourced {
   value: number;
@@ -34,6 +35,32 @@ export const DEFAULT_ECONOMICS: Economics = {
   carbon: { value: 0.21, source: "EEA: electricity generation in the EU, 2023", letter: "C" },
   box: null,
 };
+
+/** The assumptions that a project holds; in place of what is no number of its kind, the default. */
+export function economicsOf(given: Record<string, unknown>): Economics {
+  const known = DEFAULT_ECONOMICS;
+  return {
+    cycle: numberOf(given.cycle, 0) || null,
+    shift: numberOf(given.shift, known.shift),
+    shiftsPerYear: numberOf(given.shiftsPerYear, known.shiftsPerYear),
+    price: sourcedOf(given.price, known.price),
+    carbon: sourcedOf(given.carbon, known.carbon),
+    box: sourcedOf(given.box, known.box),
+  };
+}
+
+const numberOf = <T>(given: unknown, otherwise: T): number | T =>
+  typeof given === "number" && given >= 0 ? given : otherwise;
+
+function sourcedOf<T>(given: unknown, otherwise: T): Sourced | T {
+  if (!isObject(given) || numberOf(given.value, null) === null) return otherwise;
+  const { value, source, letter } = given;
+  return {
+    value: value as number,
+    source: typeof source === "string" ? source : "yours",
+    ...(typeof letter === "string" ? { letter } : {}),
+  };
+}
 
 const JOULES = 3.6e6; // of a kWh
 

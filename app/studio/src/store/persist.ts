@@ -2,7 +2,7 @@
 import { effect, untracked } from "@preact/signals";
 import { freshName } from "./request";
 import { answered, economics, project, request, saved, toast, typed } from "./state";
-import type { Cell } from "./share";
+import { cellFrom, type Cell } from "./share";
 
 export interface Saved extends Cell {
   id: string;
@@ -52,10 +52,16 @@ async function within<T>(
 export const newId = () =>
   crypto.randomUUID?.() ?? `${Date.now()}-${Math.random().toString(36).slice(2)}`;
 
+/** When the newest project was saved: the next one is newer, even after a clock was set back. */
+let newest = 0;
+
 /** All projects, the last saved first. */
 export async function projects(): Promise<Saved[]> {
   const all = await within<Saved[]>("projects", "readonly", (store) => store.getAll());
-  return all.sort((a, b) => b.savedAt - a.savedAt);
+  newest = Math.max(newest, ...all.map(({ savedAt }) => savedAt));
+  return all
+    .map((each) => ({ ...each, name: "Untitled cell", ...cellFrom({ ...each }) }))
+    .sort((a, b) => b.savedAt - a.savedAt);
 }
 
 export const deleteProject = (id: string) =>
@@ -107,7 +113,7 @@ function recordNow(): Saved {
   const shown = answered.value;
   return {
     ...project.value,
-    savedAt: Date.now(),
+    savedAt: (newest = Math.max(newest + 1, Date.now())),
     request: request.value,
     typed: typed.value,
     economics: economics.value,

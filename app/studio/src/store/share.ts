@@ -1,6 +1,6 @@
 // Links that hold a whole cell, and project files.
 import { Problem } from "./client";
-import type { Economics } from "./economics";
+import { economicsOf, type Economics } from "./economics";
 import type { Pointer } from "./pointer";
 import { isObject } from "./request";
 import { economics, project, request, typed } from "./state";
@@ -27,10 +27,31 @@ export function parsed(text: string): ApiRequest {
   throw new SyntaxError("Give a JSON object: names and values in braces.");
 }
 
+// of which every request of a cell has one
+const TASK = ["robot", "start", "goal", "stops", "path", "tool", "payload", "scene"];
+
 /** A cell from the text of a project file, or of a request alone. Throws SyntaxError. */
 export function cellOf(text: string): Cell {
   const value = parsed(text);
-  return isObject(value.request) ? (value as unknown as Cell) : { request: value };
+  const cell = isObject(value.request) ? cellFrom(value) : { request: value };
+  if (["trajectory", "legs", "map"].some((name) => name in cell.request))
+    throw new SyntaxError("It holds an answer: open the request instead.");
+  if (!TASK.some((name) => name in cell.request))
+    throw new SyntaxError("It holds neither targets nor a robot.");
+  return cell;
+}
+
+/** A cell as another program or version wrote it: what has not the type of its field is left out. */
+export function cellFrom({ name, request, typed, economics }: Record<string, unknown>): Cell {
+  const texts = isObject(typed) ? Object.entries(typed) : [];
+  return {
+    ...(typeof name === "string" && name.trim() ? { name: name.trim() } : {}),
+    request: isObject(request) ? request : {},
+    typed: Object.fromEntries(
+      texts.filter(([, text]) => typeof text === "string"),
+    ) as Cell["typed"],
+    ...(isObject(economics) ? { economics: economicsOf(economics) } : {}),
+  };
 }
 
 /** The address of this page with the cell in it. */
