@@ -1,6 +1,6 @@
 // What a person reads when the connection to the service fails.
-import { beforeEach, expect, it, vi } from "vitest";
-import { get, Problem } from "../src/store/client";
+import { expect, it, vi } from "vitest";
+import { get, keyAsked, Problem } from "../src/store/client";
 import { optimise } from "../src/store/run";
 import { MOVE } from "./cells";
 
@@ -15,10 +15,6 @@ const broken = (first: string) =>
   });
 const EVENTS = "text/event-stream";
 const listen = () => optimise(MOVE);
-
-beforeEach(() => {
-  vi.stubGlobal("sessionStorage", { getItem: () => null });
-});
 
 it.each([
   [
@@ -35,4 +31,20 @@ it.each([
   const problem = await (asked() as Promise<unknown>).catch((error: unknown) => error);
   expect(problem).toBeInstanceOf(Problem);
   expect((problem as Problem).message).toContain("ended before the answer was complete");
+});
+
+it("a browser that stores nothing remembers the key until the page is left", async () => {
+  const refuse = () => {
+    throw new DOMException("Access is denied.", "SecurityError");
+  };
+  vi.stubGlobal("sessionStorage", { getItem: refuse, setItem: refuse });
+  vi.stubGlobal("fetch", (_: string, { headers }: { headers: Record<string, string> }) => {
+    const known = headers.Authorization === "Bearer key";
+    return Promise.resolve(new Response("{}", { status: known ? 200 : 401 }));
+  });
+  const first = get("robots");
+  await vi.waitFor(() => expect(keyAsked.value).not.toBeNull());
+  keyAsked.value!("key");
+  expect(await first).toEqual({});
+  expect(await get("robots")).toEqual({});
 });

@@ -23,7 +23,6 @@ const result = (index: number, total: number) =>
 let asked: string[];
 beforeEach(() => {
   asked = [];
-  vi.stubGlobal("sessionStorage", { getItem: () => null });
   vi.stubGlobal("fetch", (path: string) => {
     asked.push(path);
     return Promise.resolve(new Response([result(0, 50), result(2, 70)].join("\n")));

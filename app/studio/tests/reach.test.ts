@@ -9,7 +9,6 @@ const answers: [number, unknown][] = [];
 
 beforeEach(() => {
   vi.useFakeTimers();
-  vi.stubGlobal("sessionStorage", { getItem: () => null });
   vi.stubGlobal("fetch", () => {
     const [status, body] = answers.shift()!;
     return Promise.resolve(new Response(JSON.stringify(body), { status }));

@@ -8,7 +8,6 @@ let saved: string[];
 
 beforeEach(() => {
   saved = [];
-  vi.stubGlobal("sessionStorage", { getItem: () => null });
   vi.stubGlobal("document", {
     createElement: () => ({
       click() {},

@@ -5,6 +5,26 @@ import type { ProblemDetails } from "./types";
 
 const KEY = "joulepath key";
 
+/** The API key: until the tab is closed, or the page is left where the browser stores nothing. */
+let given: string | null = null;
+
+function keyNow(): string | null {
+  try {
+    return sessionStorage.getItem(KEY);
+  } catch {
+    return given;
+  }
+}
+
+function keepKey(key: string): void {
+  given = key;
+  try {
+    sessionStorage.setItem(KEY, key);
+  } catch {
+    // the page remembers it
+  }
+}
+
 /** A refusal by the service, with its problem document. */
 export class Problem extends Error {
   constructor(readonly details: ProblemDetails) {
@@ -48,7 +68,7 @@ const posting = (
  * Problem.
  */
 export async function send(path: string, options: RequestInit): Promise<Response> {
-  const key = sessionStorage.getItem(KEY);
+  const key = keyNow();
   const headers = {
     ...(options.headers as Record<string, string>),
     ...(key ? { Authorization: `Bearer ${key}` } : {}),
@@ -157,7 +177,7 @@ function askForKey(): Promise<boolean> {
   return new Promise((resolve) => {
     keyAsked.value = (key) => {
       keyAsked.value = null;
-      if (key) sessionStorage.setItem(KEY, key);
+      if (key) keepKey(key);
       resolve(Boolean(key));
     };
   });
