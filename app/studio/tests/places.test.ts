@@ -1,10 +1,11 @@
-import { beforeEach, describe, expect, it } from "vitest";
+import { beforeEach, describe, expect, it, vi } from "vitest";
 import { IDENTITY, inverse, multiply, ofPose } from "../src/store/chain";
 import { put } from "../src/store/pointer";
-import { accept, regionOf, regionTyped, roundOf } from "../src/store/placement";
+import { accept, regionOf, regionTyped, roundOf, search } from "../src/store/placement";
 import { columnsOf, coordinatesOf, movedTo, pitchOf, worldOf, yawOf } from "../src/store/places";
 import type { Place } from "../src/store/places";
 import { seenFrom } from "../src/store/seenFrom";
+import { knowRobot } from "../src/store/service";
 import {
   answered,
   edit,
@@ -171,11 +172,30 @@ describe("a look at a place", () => {
     undo();
     expect([request.value, answered.value, stale.value]).toEqual([MOVE, before, false]);
   });
-  it("is accepted without it where only a round of the move and its wait was computed", () => {
-    const motion = { asked: MOVE, cycle: {}, solution: {} } as Answered;
+  it.each([
+    ["which was placed as a round of this move alone", MOVE, "answers/move"],
+    ["which its wait made another round of", { ...MOVE, dwell: { time: 6 } }, "optimize"],
+  ])("at the best place shows the move, %s", async (_, asked, last) => {
+    const sent: string[] = [];
+    const base = { position: [0.1, 0, 0] };
+    const best = { base, mount: null, energy: 1, cycles: [{ answer: "answers/round" }] };
+    const legs = [{ answer: "answers/move" }, ...("dwell" in asked ? [{ answer: null }] : [])];
+    const move = { id: null, robot: "ur5e", objective: "electrical" };
+    const answers: Record<string, unknown> = {
+      placement: { id: null, best, nominal: null, map: [] },
+      "answers/round": { answer: { legs } },
+      "answers/move": { answer: { ...move, energy: { electrical: { total: 1 } } } },
+      optimize: { ...move, energy: { electrical: { total: 1 } } },
+    };
+    vi.stubGlobal("fetch", (path: string) => {
+      sent.push(path);
+      return Promise.resolve(Response.json(answers[path]));
+    });
+    knowRobot({ ...UR, links: [] } as unknown as Robot);
     placing.value = true;
-    looking.value = { asked: MOVE, robot: UR, pose: QUARTER, motion } as typeof looking.value;
-    accept();
-    expect(answered.value).toBe(null);
+    replaceCell({ project: { id: "1", name: "test" }, request: asked });
+    await search();
+    expect([looked.value?.state, sent.at(-1)]).toEqual(["shown", last]);
+    expect(looked.value?.motion?.cycle).toBe(null);
   });
 });

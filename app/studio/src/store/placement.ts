@@ -216,10 +216,10 @@ async function motionAt({ asked, robot, pose }: Looked, map: Mapped | null) {
   const kept = placed.find((each) => each && isAt(poseOf(map!, each), pose));
   if (kept) {
     const round = await keptAnswer<Cycle>(kept.cycles[0]!.answer);
-    // a single move was placed as a round of this move alone
+    if (asked.stops !== undefined) return answeredBy(round, there, null);
+    // a single move was placed as a round; with a wait, it is computed as the move that it is
     const [leg, ...rests] = round.legs;
-    const move = asked.stops === undefined && !rests.length ? leg!.answer : null;
-    return answeredBy(move ? await keptAnswer(move) : round, there, null);
+    if (!rests.length) return answeredBy(await keptAnswer(leg!.answer!), there, null);
   }
   const answer = await compute(endpointOf(asked), there, deadlineOf(asked));
   if (!answer) return null;
@@ -241,8 +241,7 @@ export function accept(): void {
   const { asked } = motion;
   batch(() => {
     edit(asked, typed.value);
-    // of a move with its wait, only the round of both was computed
-    if (Boolean(motion.cycle) === (endpointOf(asked) === "cycle")) display(motion);
+    display(motion);
     close();
     toast.value = "All poses are seen from the new place of the base now.";
   });
