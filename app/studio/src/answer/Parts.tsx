@@ -50,7 +50,7 @@ export function Parts({ electrical }: { electrical: Electrical }) {
         {listed.map(({ key, value, text, title }) => (
           <li key={key} title={title}>
             <i class={`swatch part-${key}`} />
-            {text} <b>{figure(value)}</b>
+            {text} <b>{figure(value)} J</b>
           </li>
         ))}
       </ul>

@@ -55,6 +55,7 @@ export function NumberCell({ label, pointer, value, unit, onValue, onPaste, with
     if (event.key === "Enter" && !event.ctrlKey && !event.metaKey) commit(input.value);
     if (!up) return;
     event.preventDefault();
+    if (typedValue(input.value, unit) === null) return;
     commit(stepped(input.value, up * (event.shiftKey ? 10 : 1)));
   };
   return (

@@ -11,7 +11,9 @@ export function Segment<T extends string>({ label, options, value, onChange }: P
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!step) return;
     event.preventDefault();
-    const all = [...(event.currentTarget as HTMLElement).querySelectorAll("button")];
+    const all = [
+      ...(event.currentTarget as HTMLElement).querySelectorAll<HTMLButtonElement>("button:enabled"),
+    ];
     const next =
       all[
         (all.indexOf(document.activeElement as HTMLButtonElement) + step + all.length) % all.length

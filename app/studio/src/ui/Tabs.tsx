@@ -13,7 +13,9 @@ export function Tabs<T extends string>({ label, options, value, onChange, contro
     if (!step) return;
     event.preventDefault();
     event.stopPropagation();
-    const all = [...(event.currentTarget as HTMLElement).querySelectorAll("button")];
+    const all = [
+      ...(event.currentTarget as HTMLElement).querySelectorAll<HTMLButtonElement>("button:enabled"),
+    ];
     const next =
       all[
         (all.indexOf(document.activeElement as HTMLButtonElement) + step + all.length) % all.length
