@@ -110,7 +110,7 @@ class EvaluateSettings(ArmRequest):
         "s",
         0.05,
         default=None,
-        ge=1e-4,
+        ge=DURATIONS.least_period,
         le=3600,
     )
     deadline: float | None = described(

@@ -231,7 +231,7 @@ class MotionRequest(ArmRequest):
         "s",
         0.008,
         default=0.008,
-        ge=1e-4,
+        ge=DURATIONS.least_period,
         le=1,
         validate_default=True,
     )

@@ -13,6 +13,8 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.presentation import bounds_in_words
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen, per_joint
+from joulepath.optimizer.problem.problem import DURATIONS
+from joulepath.optimizer.problem.scalars import check_choices, check_number
 from joulepath.optimizer.problem.uncoupled import check_uncoupled
 
 Part = Literal["inertials", "rotor", "friction"]
@@ -80,17 +82,17 @@ class ExcitationProblem:
     """Time after which the best motion so far is returned [s]."""
 
     def __post_init__(self) -> None:
-        for name, least, most in (
-            ("period", REQUEST_LIMITS.min_period, REQUEST_LIMITS.max_period),
-            ("harmonics", 2, REQUEST_LIMITS.max_harmonics),
-            ("speed_fraction", 0.01, 1.0),
-            ("clearance", 0.0, 0.5),
-            ("starts", 1, 100),
-            ("sample_period", 1e-4, 1.0),
-            ("deadline", REQUEST_LIMITS.min_deadline, np.inf),
+        for name, unit, least, most in (
+            ("period", "seconds", REQUEST_LIMITS.min_period, REQUEST_LIMITS.max_period),
+            ("harmonics", "", 2, REQUEST_LIMITS.max_harmonics),
+            ("speed_fraction", "", 0.01, 1.0),
+            ("clearance", "metres", 0.0, 0.5),
+            ("starts", "", 1, 100),
+            ("sample_period", "seconds", DURATIONS.least_period, 1.0),
+            ("deadline", "seconds", REQUEST_LIMITS.min_deadline, np.inf),
         ):
-            if not least <= getattr(self, name) <= most:
-                raise InvalidProblem(name, f"{name} must lie between {least:g} and {most:g}.")
+            given = getattr(self, name)
+            check_number(name, given, unit, least=least, most=most, infinite=True)
         if self.period > self.sample_period * MOTION_LIMITS.max_samples:
             enough = bounds_in_words.least(self.period / MOTION_LIMITS.max_samples)
             raise InvalidProblem(
@@ -100,10 +102,7 @@ class ExcitationProblem:
             raise InvalidProblem(
                 "parameters", f"parameters must name some of {', '.join(get_args(Part))}."
             )
-        if self.criterion not in get_args(Criterion):
-            raise InvalidProblem(
-                "criterion", f"criterion must be one of {', '.join(get_args(Criterion))}."
-            )
+        check_choices(self)
         if self.arm.tool_cone is not None:
             raise InvalidProblem(
                 "tool_cone", "An excitation turns the tool in every direction: leave tool_cone out."

@@ -29,6 +29,7 @@ from joulepath.optimizer.export.ros_messages import MoveitOptions, Ros2Options, 
 from joulepath.optimizer.export.rows import TableOptions
 from joulepath.optimizer.export.urscript import UrscriptOptions, to_urscript
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scalars import check_choice, check_choices, check_number
 from joulepath.optimizer.result.solution import Solution
 
 ExportOptions = (
@@ -177,8 +178,7 @@ def export(
         DeadlineExceeded: the deadline passed first.
     """
     kind = _format(format, options)
-    if not 0 < speed_scale <= 1:
-        raise InvalidProblem("speed_scale", "speed_scale must be above 0 and at most 1.")
+    check_number("speed_scale", speed_scale, most=1.0, positive=True)
     program = _program(motion, problem)
     program = program if speed_scale == 1 else program.slowed(speed_scale)
     try:
@@ -200,14 +200,15 @@ def export(
 
 
 def _format(name: FormatName, options: ExportOptions | None) -> Format:
-    kind = FORMATS.get(name)
-    if kind is None:
-        raise InvalidProblem("format", f"format must be one of {', '.join(FORMATS)}.")
+    check_choice("format", name, FormatName)
+    kind = FORMATS[name]
     if options is not None and type(options) is not kind.options:
         own = "has no options" if kind.options is None else f"takes {kind.options.__name__}"
         raise InvalidProblem(
             "options", f"The format {name} {own}: leave out {type(options).__name__}."
         )
+    if options is not None:
+        check_choices(options, f"{name}.")
     return kind
 
 

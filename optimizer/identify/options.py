@@ -11,6 +11,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Method, Target, Term
+from joulepath.optimizer.problem.scalars import check_choices, check_number
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,24 +83,21 @@ class IdentificationOptions:
                     name, f"{name} must name some of {', '.join(allowed)}, each once."
                 )
             object.__setattr__(self, name, given)
-        for name, choices in (("estimator", Estimator), ("method", Method)):
-            if getattr(self, name) not in get_args(choices):
-                raise InvalidProblem(name, f"{name} must be one of {', '.join(get_args(choices))}.")
+        check_choices(self)
         if self.refit and self.links_unknown:
             raise InvalidProblem(
                 "inertials",
                 f"The method {self.method} finds the links by itself: keep the inertials.",
             )
-        for name, least, most, unit in (
-            ("period", 0.1, 1e4, " s"),
-            ("held_out", 0.0, 1.0, ""),
-            ("velocity_threshold", 0.0, 10.0, " rad/s"),
-            ("prior_weight", 1e-6, 1e6, ""),
-            ("knee", 1e-6, 1.0, " rad/s"),
+        for name, unit, least, most, optional in (
+            ("period", "seconds", 0.1, 1e4, True),
+            ("held_out", "", 0.0, 1.0, False),
+            ("velocity_threshold", "radians per second", 0.0, 10.0, False),
+            ("prior_weight", "", 1e-6, 1e6, False),
+            ("knee", "radians per second", 1e-6, 1.0, True),
         ):
             value = getattr(self, name)
-            if value is not None and not least <= value <= most:
-                raise InvalidProblem(name, f"{name} must be from {least:g} to {most:g}{unit}.")
+            check_number(name, value, unit, least=least, most=most, optional=optional)
         object.__setattr__(self, "couplings", tuple(self.couplings))
         object.__setattr__(self, "mains", tuple(self.mains))
         if not all(each is None or 0 < each <= 1e6 for each in self.mains):

@@ -10,10 +10,11 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.placement.region import Group, Moved, Region
-from joulepath.optimizer.problem.arrays import check_seconds, placement
+from joulepath.optimizer.problem.arrays import placement
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import START, Cycle
 from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.scalars import check_number
 from joulepath.optimizer.problem.targets import Target, members
 from joulepath.optimizer.problem.uncoupled import check_uncoupled
 from joulepath.optimizer.result.energy import Objective
@@ -56,9 +57,7 @@ class WeightedCycle:
     weight: float = 1.0
 
     def __post_init__(self) -> None:
-        most = PLACEMENT_RANGES.max_weight
-        if not 0 < self.weight <= most:
-            raise InvalidProblem("weight", f"weight must be above 0 and at most {most:g}.")
+        check_number("weight", self.weight, most=PLACEMENT_RANGES.max_weight, positive=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,9 +97,8 @@ class Placement:
                 "moves", f"A placement moves 1 to {PLACEMENT_RANGES.max_moved} bodies."
             )
         least, most = PLACEMENT_RANGES.finest, PLACEMENT_RANGES.coarsest
-        if self.resolution is not None and not least <= self.resolution <= most:
-            raise InvalidProblem("resolution", f"resolution must be from {least:g} to {most:g} m.")
-        check_seconds(self, "deadline")
+        check_number("resolution", self.resolution, "metres", least=least, most=most, optional=True)
+        check_number("deadline", self.deadline, "seconds", positive=True)
         self._check_cycles()
         self._check_moved()
         for k, each in enumerate(self.moved):

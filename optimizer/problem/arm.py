@@ -16,6 +16,7 @@ from joulepath.optimizer.presentation import bounds_in_words
 from joulepath.optimizer.problem.arrays import frozen, per_joint, rigid_transform
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.names import first_taken
+from joulepath.optimizer.problem.scalars import check_number, check_speed
 from joulepath.optimizer.problem.scene import Attachment, Scene
 from joulepath.optimizer.problem.tool_cone import ToolCone
 
@@ -69,10 +70,7 @@ class Payload:
     shape: Attachment | None = None
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.mass) and self.mass >= 0):
-            raise InvalidProblem(
-                "payload.mass", "payload.mass must be a finite number of kg, zero or more."
-            )
+        check_number("payload.mass", self.mass, "kilograms")
         # Pinocchio takes no number of numpy's other types
         object.__setattr__(self, "mass", float(self.mass))
         object.__setattr__(self, "com", frozen(self.com, (3,), "payload.com"))
@@ -174,12 +172,7 @@ class Arm:
         self._check_names()
         self._check_limits()
         for name in ("tcp_speed", "elbow_speed"):
-            speed = getattr(self, name)
-            if speed is not None and not ARM_RANGES.least_speed <= speed < np.inf:
-                raise InvalidProblem(
-                    f"limits.{name}",
-                    f"limits.{name} must be at least {ARM_RANGES.least_speed:g} m/s.",
-                )
+            check_speed(f"limits.{name}", getattr(self, name), ARM_RANGES.least_speed)
         if self.elbow_speed is not None and self.robot.elbow is None:
             raise InvalidProblem(
                 "limits.elbow_speed", "This robot has no elbow: leave limits.elbow_speed out."

@@ -10,8 +10,9 @@ import numpy as np
 
 from joulepath.models.arrays import read_only
 from joulepath.models.robot import Array
-from joulepath.models.shape_sizes import SIZES, WrongSize, check_lengths
+from joulepath.models.shape_sizes import SIZES, WrongSize
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.scalars import check_number
 
 Checked = TypeVar("Checked")
 
@@ -53,13 +54,13 @@ def sized(field: str, check: Callable[[], Checked]) -> Checked:
         raise InvalidProblem(field, str(error)) from None
 
 
-def check_sizes(field: str, lengths: float | Array) -> None:
-    """Check radii, lengths or edges [m] of a body.
+def check_size(field: str, length: object) -> None:
+    """Check a radius, a length or an edge [m] of a body.
 
     Raises:
         InvalidProblem: no body has this size.
     """
-    sized(field, lambda: check_lengths(field, lengths))
+    check_number(field, length, "metres", least=SIZES.smallest, most=SIZES.largest)
 
 
 def per_joint(values: object, count: int, field: str, least: float, most: float) -> Array:
@@ -115,10 +116,3 @@ def placement(values: object, field: str) -> Array:
     if np.abs(T[:3, 3]).max() > SIZES.largest:
         raise InvalidProblem(field, f"{field} must lie within {SIZES.largest:g} m of the origin.")
     return T
-
-
-def check_seconds(asked: object, *names: str) -> None:
-    """Check attributes that are times [s]. Raises InvalidProblem unless they are positive."""
-    for name in names:
-        if not (np.isfinite(getattr(asked, name)) and getattr(asked, name) > 0):
-            raise InvalidProblem(name, f"{name} must be a positive number of seconds.")

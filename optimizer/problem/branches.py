@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Literal
 
+from joulepath.optimizer.problem.scalars import check_choices
+
 Shoulder = Literal["left", "right"]
 Elbow = Literal["up", "down"]
 Wrist = Literal["flip", "no_flip"]
@@ -59,11 +61,18 @@ BranchLabel = Label | NumberedBranch
 
 @dataclass(frozen=True)
 class BranchFilter:
-    """Branches allowed by a request; None leaves a part free."""
+    """Branches allowed by a request; None leaves a part free.
+
+    Raises:
+        InvalidProblem: there is no such branch; names the field.
+    """
 
     shoulder: Shoulder | None = None
     elbow: Elbow | None = None
     wrist: Wrist | None = None
+
+    def __post_init__(self) -> None:
+        check_choices(self, "branch.")
 
     def allows(self, label: object, singular: Sequence[str] = ()) -> bool:
         """Whether the filter allows a configuration.

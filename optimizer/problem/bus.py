@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.scalars import check_choices, check_number
 
 BusMode = Literal["shared", "isolated", "recuperating", "storage"]
 
@@ -35,20 +36,10 @@ class Bus:
     initial: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.mode not in ("shared", "isolated", "recuperating", "storage"):
-            raise InvalidProblem(
-                "bus.mode", "bus.mode must be shared, isolated, recuperating or storage."
-            )
-        # negated comparisons refuse NaN
-        if not 0 <= self.efficiency <= 1:
-            raise InvalidProblem("bus.efficiency", "bus.efficiency must be a number from 0 to 1.")
-        if not 0 <= self.capacity < np.inf:
-            raise InvalidProblem(
-                "bus.capacity", "bus.capacity must be a finite number of joules, zero or more."
-            )
-        if not self.power > 0:
-            raise InvalidProblem("bus.power", "bus.power must be a positive number of watts.")
-        if not 0 <= self.initial <= self.capacity:
-            raise InvalidProblem(
-                "bus.initial", "bus.initial must be a charge from 0 to bus.capacity."
-            )
+        check_choices(self, "bus.")
+        check_number("bus.efficiency", self.efficiency, most=1.0)
+        check_number("bus.capacity", self.capacity, "joules")
+        check_number("bus.power", self.power, "watts", positive=True, infinite=True)
+        check_number("bus.initial", self.initial, "joules")
+        if self.initial > self.capacity:
+            raise InvalidProblem("bus.initial", "bus.initial must not exceed bus.capacity.")

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from joulepath.models.robot import Array
 from joulepath.models.shape_sizes import SIZES, check_extent
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.problem.arrays import check_sizes, frozen, sized
+from joulepath.optimizer.problem.arrays import check_size, frozen, sized
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Points:
             "points: thin the cloud out, for example to one point per voxel",
         )
         _within_reach("points", points)
-        check_sizes("radius", self.radius)
+        check_size("radius", self.radius)
         object.__setattr__(self, "points", points)
 
 
@@ -89,7 +89,7 @@ class Voxels:
     cells: Whole
 
     def __post_init__(self) -> None:
-        check_sizes("size", self.size)
+        check_size("size", self.size)
         cells = np.unique(np.array(self.cells, dtype=np.int64).reshape(-1, 3), axis=0)
         _count("cells", len(cells), CLOUD_RANGES.max_voxels, "occupied cells: use larger voxels")
         if np.abs(cells).max() > CLOUD_RANGES.max_along_edge:

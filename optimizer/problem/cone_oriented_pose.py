@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import frozen, unit_vector
 from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.scalars import check_number
 
 
 @dataclass(frozen=True)
@@ -40,11 +40,7 @@ class ConeOrientedPose:
             object.__setattr__(
                 self, name, unit_vector(getattr(self, name), f"pose.orientation.{name}")
             )
-        if not 0 <= self.half_angle <= np.pi:
-            raise InvalidProblem(
-                "pose.orientation.half_angle",
-                "pose.orientation.half_angle must be between 0 and pi rad.",
-            )
+        check_number("pose.orientation.half_angle", self.half_angle, "radians", most=np.pi)
 
     @staticmethod
     def about(pose: Pose, axis: Array) -> ConeOrientedPose:

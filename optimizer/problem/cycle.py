@@ -12,12 +12,17 @@ import numpy as np
 
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.arrays import check_seconds
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.dwell import Dwell, Hold
 from joulepath.optimizer.problem.free_order import FreeOrder, check_order
 from joulepath.optimizer.problem.names import check_name, first_repeated
-from joulepath.optimizer.problem.problem import DURATIONS, BoundEffort, MethodName
+from joulepath.optimizer.problem.problem import (
+    DURATIONS,
+    BoundEffort,
+    MethodName,
+    check_search,
+)
+from joulepath.optimizer.problem.scalars import check_number
 from joulepath.optimizer.problem.stop_path import StopPath, at_stop
 from joulepath.optimizer.problem.stops import (
     APPROACH,
@@ -114,6 +119,7 @@ class Cycle:
     deadline: float = 60.0
 
     def __post_init__(self) -> None:
+        check_search(self)
         object.__setattr__(self, "stops", tuple(self.stops))
         if not 1 <= len(self.stops) <= CYCLE_RANGES.max_stops:
             raise InvalidProblem("stops", f"A cycle must have 1 to {CYCLE_RANGES.max_stops} stops.")
@@ -125,10 +131,7 @@ class Cycle:
         )
         object.__setattr__(self, "stops", checked)
         for k, stop in enumerate(self.stops):
-            if not 0 <= stop.dwell <= DURATIONS.longest:
-                raise InvalidProblem(
-                    f"stops.{k}.dwell", f"dwell must be from 0 to {DURATIONS.longest:g} s."
-                )
+            check_number(f"stops.{k}.dwell", stop.dwell, "seconds", most=DURATIONS.longest)
             self._check_limits(k, stop)
             for name in ("approach", "retreat", "path"):
                 if getattr(stop, name) is not None:
@@ -143,7 +146,6 @@ class Cycle:
                 f"stops.{k}.payload.mass", 0.0 if stop.payload is None else stop.payload.mass
             )
         self.arm.check_rating("payload.mass", self.arm.payload.mass)
-        check_seconds(self, "sample_period", "deadline")
         if self.order is not None:
             check_order(self.order, self.stops, self.arm.payload)
         self._check_passes()
@@ -253,10 +255,8 @@ class Cycle:
 
     def _check_duration(self) -> None:
         for value in (self.duration_min, self.duration_max):
-            if value is not None and not 0 < value <= CYCLE_RANGES.longest:
-                raise InvalidProblem(
-                    "time", f"time must be above 0 and at most {CYCLE_RANGES.longest:g} s."
-                )
+            longest = CYCLE_RANGES.longest
+            check_number("time", value, "seconds", most=longest, positive=True, optional=True)
         if (
             self.duration_min is not None
             and self.duration_max is not None

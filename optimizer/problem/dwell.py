@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.scalars import check_choices, check_number
 
 Hold = Literal["motors", "brakes"]
 
@@ -33,17 +31,7 @@ class Dwell:
     brake_power: float | None = None
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.time) and self.time > 0):
-            raise InvalidProblem("dwell.time", "dwell.time must be a positive number of seconds.")
-        if self.hold not in ("motors", "brakes"):
-            raise InvalidProblem("dwell.hold", "dwell.hold must be motors or brakes.")
-        if not (np.isfinite(self.brake_delay) and self.brake_delay >= 0):
-            raise InvalidProblem(
-                "dwell.brake_delay", "dwell.brake_delay must be a number of seconds, zero or more."
-            )
-        if self.brake_power is not None and not (
-            np.isfinite(self.brake_power) and self.brake_power >= 0
-        ):
-            raise InvalidProblem(
-                "dwell.brake_power", "dwell.brake_power must be a number of watts, zero or more."
-            )
+        check_number("dwell.time", self.time, "seconds", positive=True)
+        check_choices(self, "dwell.")
+        check_number("dwell.brake_delay", self.brake_delay, "seconds")
+        check_number("dwell.brake_power", self.brake_power, "watts", optional=True)

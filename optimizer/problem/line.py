@@ -10,6 +10,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import frozen
+from joulepath.optimizer.problem.scalars import check_choices, check_number, check_speed
 
 LineFrame = Literal["tcp", "base"]
 
@@ -54,17 +55,10 @@ class Line:
                 "direction",
                 "direction must not be zero: give the vector along which the TCP moves.",
             )
-        if not LINE_RANGES.least_distance <= self.distance <= LINE_RANGES.greatest_distance:
-            raise InvalidProblem(
-                "distance",
-                f"distance must be from {LINE_RANGES.least_distance:g} to "
-                f"{LINE_RANGES.greatest_distance:g} m: "
-                f"{self.distance!r}.",
-            )
-        if self.frame not in ("tcp", "base"):
-            raise InvalidProblem("frame", "frame must be tcp or base.")
-        if self.speed is not None and not (np.isfinite(self.speed) and self.speed > 0):
-            raise InvalidProblem("speed", "speed must be a positive number of metres per second.")
+        least, most = LINE_RANGES.least_distance, LINE_RANGES.greatest_distance
+        check_number("distance", self.distance, "metres", least=least, most=most)
+        check_choices(self)
+        check_speed("speed", self.speed)
 
     def shift(self, T_base_tcp: Array) -> Array:
         """Displacement (3,) [m] of the TCP in the base frame, at a stop with pose T_base_tcp (4,

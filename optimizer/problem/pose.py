@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import frozen, rigid_transform
+from joulepath.optimizer.problem.scalars import check_choice
 
 QUATERNION_TOLERANCE = 1e-3
 """Greatest deviation of a quaternion's norm from 1, as after rounding to three decimals."""
@@ -94,8 +95,10 @@ class Pose:
         """
         given = frozen(values, (6,), "pose")
         position = given[:3] * metres_per(length)
-        turns = given[3:] * (np.pi / 180 if _known(angle, AngleUnit, "angle") == "deg" else 1.0)
-        match _known(rotation, PendantRotation, "rotation"):
+        check_choice("angle", angle, AngleUnit)
+        check_choice("rotation", rotation, PendantRotation)
+        turns = given[3:] * (np.pi / 180 if angle == "deg" else 1.0)
+        match rotation:
             case "rotvec":
                 return cls.from_rotvec(position, turns)
             case "rpy":
@@ -215,14 +218,8 @@ def nearest_rotation(R: object) -> Array:
 
 def metres_per(unit: LengthUnit) -> float:
     """Factor from a unit of length to metres. Raises InvalidProblem if the unit is unknown."""
-    return 1e-3 if _known(unit, LengthUnit, "length") == "mm" else 1.0
-
-
-def _known(value: str, choices: Any, name: str) -> str:
-    """The value of an option. Raises InvalidProblem unless it is one of the literals `choices`."""
-    if value not in get_args(choices):
-        raise InvalidProblem("pose", f"{name} must be one of {', '.join(get_args(choices))}.")
-    return value
+    check_choice("length", unit, LengthUnit)
+    return 1e-3 if unit == "mm" else 1.0
 
 
 def _part(message: Any, name: str, default: Any = None) -> Any:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.arrays import check_seconds
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell
+from joulepath.optimizer.problem.scalars import check_choices, check_number
 from joulepath.optimizer.problem.targets import AnyOf, Target, members, validated
 from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.problem.uncoupled import check_uncoupled
@@ -34,6 +34,8 @@ class DurationRanges:
     """Least duration of a motion [s], also if start and goal are the same."""
     longest: float = 600.0
     """Greatest duration of a motion [s]."""
+    least_period: float = 1e-4
+    """Least period of samples [s]."""
 
 
 DURATIONS = DurationRanges()
@@ -90,10 +92,9 @@ class Problem:
         for name in ("start", "goal"):
             end = validated(self.arm, name, getattr(self, name), on_path=self.tool_path is not None)
             object.__setattr__(self, name, end)
+        check_search(self)
         for name in ("duration_min", "duration_max"):
-            value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value > 0):
-                raise InvalidProblem("duration", "duration must be a positive number of seconds.")
+            check_number("duration", getattr(self, name), "seconds", positive=True, optional=True)
         if (
             self.duration_min is not None
             and self.duration_max is not None
@@ -134,7 +135,6 @@ class Problem:
                 "The mechanical objective has no best duration of its own: give a duration or a "
                 "duration.max.",
             )
-        check_seconds(self, "sample_period", "deadline")
 
     @property
     def has_fixed_duration(self) -> bool:
@@ -150,3 +150,14 @@ class Problem:
 def narrowed(problem: Problem, start: int, goal: int) -> Problem:
     """The problem with a single start and goal: those of the given indices."""
     return replace(problem, start=members(problem.start)[start], goal=members(problem.goal)[goal])
+
+
+def check_search(asked: Any) -> None:
+    """Check the choices, the sample period and the deadline of a problem or a cycle.
+
+    Raises:
+        InvalidProblem: one is unknown or out of range; names the field.
+    """
+    check_choices(asked)
+    check_number("sample_period", asked.sample_period, "seconds", least=DURATIONS.least_period)
+    check_number("deadline", asked.deadline, "seconds", positive=True)

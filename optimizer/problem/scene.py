@@ -10,9 +10,10 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.models.shape_sizes import SIZES, hull_of_body
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.problem.arrays import check_sizes, frozen, placement, sized
+from joulepath.optimizer.problem.arrays import check_size, frozen, placement, sized
 from joulepath.optimizer.problem.clouds import CLOUD_RANGES, Cloud, parts_of
 from joulepath.optimizer.problem.names import check_name, first_repeated
+from joulepath.optimizer.problem.scalars import check_number
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,8 @@ class SceneRanges:
     """Most vertices of a mesh."""
     default_margin: float = 5e-3
     """Default clearance of an obstacle [m]: the accuracy of the placement of bodies in a cell."""
+    greatest_margin: float = 1.0
+    """Greatest clearance of an obstacle [m]."""
 
 
 SCENE_RANGES = SceneRanges()
@@ -37,7 +40,7 @@ class Sphere:
     radius: float
 
     def __post_init__(self) -> None:
-        check_sizes("radius", self.radius)
+        check_size("radius", self.radius)
 
 
 @dataclass(frozen=True)
@@ -48,8 +51,8 @@ class _AlongZ:
     length: float
 
     def __post_init__(self) -> None:
-        check_sizes("radius", self.radius)
-        check_sizes("length", self.length)
+        check_size("radius", self.radius)
+        check_size("length", self.length)
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,8 @@ class Box:
 
     def __post_init__(self) -> None:
         size = frozen(self.size, (3,), "size")
-        check_sizes("size", size)
+        for edge in size.tolist():
+            check_size("size", edge)
         object.__setattr__(self, "size", size)
 
 
@@ -128,8 +132,7 @@ class Obstacle:
 
     def __post_init__(self) -> None:
         check_name("name", self.name)
-        if not (0 <= self.margin <= 1):
-            raise InvalidProblem("margin", "margin must be between 0 and 1 m.")
+        check_number("margin", self.margin, "metres", most=SCENE_RANGES.greatest_margin)
         object.__setattr__(self, "T_base_shape", placement(self.T_base_shape, "pose"))
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.scalars import check_speed
 from joulepath.optimizer.problem.targets import SampledPoses, Target, members
 from joulepath.optimizer.problem.tool_path import ToolPath
 
@@ -41,10 +40,7 @@ class StopPath:
     split: bool = False
 
     def __post_init__(self) -> None:
-        if self.speed is not None and not (np.isfinite(self.speed) and self.speed > 0):
-            raise InvalidProblem(
-                "path.speed", "path.speed must be a positive number of metres per second."
-            )
+        check_speed("path.speed", self.speed)
 
     def check_ends(self, target: Target) -> None:
         """Check the poses at both ends of the path.

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import unit_vector
+from joulepath.optimizer.problem.scalars import check_number
 
 LEAST_HALF_ANGLE = 1e-3
 """Least half angle [rad]; a narrower cone cannot be kept in double precision."""
@@ -34,8 +34,6 @@ class ToolCone:
     def __post_init__(self) -> None:
         for name in ("axis", "direction"):
             object.__setattr__(self, name, unit_vector(getattr(self, name), f"tool_cone.{name}"))
-        if not LEAST_HALF_ANGLE <= self.half_angle <= np.pi:
-            raise InvalidProblem(
-                "tool_cone.half_angle",
-                f"tool_cone.half_angle must be between {LEAST_HALF_ANGLE} and pi rad.",
-            )
+        check_number(
+            "tool_cone.half_angle", self.half_angle, "radians", least=LEAST_HALF_ANGLE, most=np.pi
+        )

@@ -12,6 +12,7 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import unit_vector
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.scalars import check_choices, check_number, check_speed
 
 PathShape = Literal["lines", "curve", "arc"]
 MOST_POINTS: dict[PathShape, int] = {"lines": 20, "curve": 500, "arc": 1}
@@ -99,10 +100,7 @@ class ToolPath:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "via", tuple(self.via))
-        if self.shape not in MOST_POINTS:
-            raise InvalidProblem(
-                "path.shape", f"path.shape must be one of {', '.join(MOST_POINTS)}."
-            )
+        check_choices(self, "path.")
         most = MOST_POINTS[self.shape]
         if len(self.via) > most:
             raise InvalidProblem(
@@ -117,34 +115,17 @@ class ToolPath:
                 self, "about", tuple(unit_vector(self.about, "path.tolerance.about").tolist())
             )
         for name in ("position_tolerance", "rotation_tolerance"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= TOOL_PATH.least_tolerance):
-                field = f"path.tolerance.{name.removesuffix('_tolerance')}"
-                raise InvalidProblem(
-                    field, f"{field} must be at least {TOOL_PATH.least_tolerance:g}."
-                )
+            kind, least = name.removesuffix("_tolerance"), TOOL_PATH.least_tolerance
+            unit = "metres" if kind == "position" else "radians"
+            check_number(f"path.tolerance.{kind}", getattr(self, name), unit, least=least)
+        check_speed("path.speed", self.fixed_speed)
         if self.fixed_speed is not None:
-            if not (np.isfinite(self.fixed_speed) and self.fixed_speed > 0):
-                raise InvalidProblem(
-                    "path.speed", "path.speed must be a positive number of metres per second."
-                )
             object.__setattr__(
                 self, "least_speed", self.fixed_speed * (1 - TOOL_PATH.speed_tolerance)
             )
-        if self.least_speed is not None and not (
-            np.isfinite(self.least_speed) and self.least_speed > 0
-        ):
-            raise InvalidProblem(
-                "path.speed.min", "path.speed.min must be a positive number of metres per second."
-            )
-        if not (np.isfinite(self.ramp) and self.ramp >= TOOL_PATH.least_ramp):
-            raise InvalidProblem(
-                "path.speed.ramp", f"path.speed.ramp must be at least {TOOL_PATH.least_ramp:g} m."
-            )
-        if not (np.isfinite(self.blend) and self.blend >= 0):
-            raise InvalidProblem(
-                "path.blend", "path.blend must be a length in metres, zero or more."
-            )
+        check_speed("path.speed.min", self.least_speed)
+        check_number("path.speed.ramp", self.ramp, "metres", least=TOOL_PATH.least_ramp)
+        check_number("path.blend", self.blend, "metres")
         if self.shape != "lines" and self.blend > 0:
             raise InvalidProblem(
                 "path.blend", "Only lines have corners: leave path.blend out for a curve or an arc."

@@ -276,7 +276,7 @@ class CycleRequest(ArmRequest):
         "s",
         0.008,
         default=0.008,
-        ge=1e-4,
+        ge=DURATIONS.least_period,
         le=1,
     )
     deadline: float = described(

@@ -25,6 +25,7 @@ from joulepath.optimizer.excitation.excitation_problem import (
 )
 from joulepath.optimizer.excitation.excitation_result import Excitation
 from joulepath.optimizer.excitation.excite import excite
+from joulepath.optimizer.problem.problem import DURATIONS
 
 _ALL: list[Part] = ["inertials", "rotor", "friction"]
 _Angles = Annotated[
@@ -92,7 +93,7 @@ class ExcitationRequest(ArmRequest):
         "s",
         0.008,
         default=0.008,
-        ge=1e-4,
+        ge=DURATIONS.least_period,
         le=1,
     )
     deadline: float = described(

@@ -11,11 +11,16 @@ from joulepath.optimizer.identify.logs.columns import ColumnMap
 from joulepath.optimizer.identify.logs.file_rows import FILE
 from joulepath.optimizer.identify.logs.log import EffortMeaning
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.scalars import check_choices
 
 
 @dataclass(frozen=True)
 class LogOptions:
-    """Information about a log beyond the content of its file."""
+    """Information about a log beyond the content of its file.
+
+    Raises:
+        InvalidProblem: a unit, the meaning of the efforts or their side is unknown.
+    """
 
     payload: Payload | None = None
     """Payload of the arm; None for the logged payload, or none if it was not logged."""
@@ -36,3 +41,6 @@ class LogOptions:
     tags: tuple[str, ...] = ()
     max_bytes: int = FILE.max_bytes
     """Largest size of the file after unpacking [bytes]."""
+
+    def __post_init__(self) -> None:
+        check_choices(self)

@@ -1,0 +1,134 @@
+"""Checks of a problem's numbers and choices; their errors name the field."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import chain
+from numbers import Real
+from reprlib import repr as short
+from types import NoneType, UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from joulepath.optimizer.exceptions import InvalidProblem
+
+
+def check_number(
+    field: str,
+    value: object,
+    unit: str = "",
+    *,
+    least: float = 0.0,
+    most: float = np.inf,
+    positive: bool = False,
+    infinite: bool = False,
+    optional: bool = False,
+) -> None:
+    """Check that a value is a number within a range.
+
+    Args:
+        field: name of the field, for the error.
+        value: the value.
+        unit: unit of the number in words, for the error; empty for a ratio.
+        least: smallest number allowed.
+        most: largest number allowed.
+        positive: whether zero is refused.
+        infinite: whether infinity is allowed.
+        optional: whether None is allowed.
+
+    Raises:
+        InvalidProblem: the value is no such number.
+    """
+    if optional and value is None:
+        return
+    number = _as_float(value)
+    # negated comparisons refuse NaN
+    if not (
+        least <= number <= most
+        and (infinite or np.isfinite(number))
+        and not (positive and number == 0)
+    ):
+        raise InvalidProblem(
+            field, f"{field} must be {_described(unit, least, most, positive)}, not {short(value)}."
+        )
+
+
+def check_speed(field: str, value: object, least: float = 0.0) -> None:
+    """Check an optional speed of a point of the arm [m/s]: above zero, and `least` or more.
+
+    Raises:
+        InvalidProblem: it is no such number.
+    """
+    check_number(field, value, "metres per second", least=least, positive=least == 0, optional=True)
+
+
+def _as_float(value: object) -> float:
+    """The value if it is a real number, else NaN; infinity for an integer that is too large."""
+    if not isinstance(value, Real):
+        return np.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return np.inf
+
+
+def _described(unit: str, least: float, most: float, positive: bool) -> str:
+    """A range in words."""
+    number = f"number of {unit}" if unit else "number"
+    if np.isfinite(most):
+        return f"a {number} {'above' if positive else 'from'} {least:g} to {most:g}"
+    if positive:
+        return f"a positive {number}"
+    return f"a {number}, {least:g} or more"
+
+
+def check_choice(field: str, value: object, choices: Any) -> None:
+    """Check that a value is one of those of a type made of literals.
+
+    Args:
+        field: name of the field, for the error.
+        value: the value.
+        choices: the type, a `Literal` or a union of literals and None.
+
+    Raises:
+        InvalidProblem: the value is none of them.
+    """
+    known = _values(choices)
+    # comparisons of arrays with text have no truth value
+    if not (isinstance(value, str | int | NoneType) and value in known):
+        named = ", ".join(str(each) for each in known if each is not None)
+        raise InvalidProblem(field, f"{field} must be one of {named}, not {short(value)}.")
+
+
+def check_choices(asked: Any, prefix: str = "") -> None:
+    """Check all fields of a dataclass whose types are made of literals.
+
+    Args:
+        asked: an instance of the dataclass.
+        prefix: what precedes the names of its fields in errors.
+
+    Raises:
+        InvalidProblem: a value is none of its literals; names the field.
+    """
+    kind: Any = type(asked)
+    for name, choices in _literal_fields(kind).items():
+        check_choice(prefix + name, getattr(asked, name), choices)
+
+
+@cache
+def _literal_fields(kind: type) -> dict[str, Any]:
+    """Types of the fields of a dataclass that are made of literals."""
+    return {name: hint for name, hint in get_type_hints(kind).items() if _values(hint)}
+
+
+def _values(hint: Any) -> tuple[object, ...]:
+    """Values of a type made of literals and None; empty for another type."""
+    if hint is NoneType:
+        return (None,)
+    if get_origin(hint) is Literal:
+        return get_args(hint)
+    if get_origin(hint) not in (Union, UnionType):
+        return ()
+    parts = [_values(part) for part in get_args(hint)]
+    return tuple(chain(*parts)) if all(parts) else ()
