@@ -44,6 +44,12 @@ def described(description: str, unit: str | None, example: Any, **constraints: A
     )
 
 
+def between(range: tuple[float, float]) -> dict[str, Any]:
+    """The constraints of a number between the ends of a range."""
+    least, most = range
+    return {"ge": least, "le": most}
+
+
 def part(description: str) -> Any:
     """A field of an answer with a model, or a list or dict of models, as its value; the examples
     are in the fields of the models.

@@ -29,7 +29,7 @@ from joulepath.optimizer.export.ros_messages import MoveitOptions, Ros2Options, 
 from joulepath.optimizer.export.rows import TableOptions
 from joulepath.optimizer.export.urscript import UrscriptOptions, to_urscript
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scalars import check_choice, check_choices, check_number
+from joulepath.optimizer.problem.scalars import check_choice, check_number
 from joulepath.optimizer.result.solution import Solution
 
 ExportOptions = (
@@ -207,8 +207,6 @@ def _format(name: FormatName, options: ExportOptions | None) -> Format:
         raise InvalidProblem(
             "options", f"The format {name} {own}: leave out {type(options).__name__}."
         )
-    if options is not None:
-        check_choices(options, f"{name}.")
     return kind
 
 

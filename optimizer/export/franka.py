@@ -16,6 +16,7 @@ from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.facts import WrittenFile, check_joints, header
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.export.rows import TABLE, ticks
+from joulepath.optimizer.problem.scalars import check_choices
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,9 @@ class FrankaOptions:
 
     form: Literal["csv", "cpp"] = "csv"
     """A table as CSV, or a C++ header with a motion generator."""
+
+    def __post_init__(self) -> None:
+        check_choices(self)
 
 
 def to_franka(program: Program, options: FrankaOptions | None = None) -> WrittenFile:

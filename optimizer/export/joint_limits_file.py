@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from joulepath.optimizer.export.facts import WrittenFile
+from joulepath.optimizer.export.option_ranges import OPTION_RANGES
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.joint_limits.joint_limits import joint_limits_along
+from joulepath.optimizer.problem.scalars import check_text
 
 
 @dataclass(frozen=True)
@@ -15,6 +17,9 @@ class LimitsOptions:
 
     prefix: str = ""
     """Prefix of all joint names."""
+
+    def __post_init__(self) -> None:
+        check_text("prefix", self.prefix, OPTION_RANGES.prefix)
 
 
 def to_joint_limits(program: Program, options: LimitsOptions | None = None) -> WrittenFile:

@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from joulepath.models.robot import Array
 from joulepath.optimizer.export.even_points import EvenPoints, even_points, smooth, straight
 from joulepath.optimizer.export.facts import WrittenFile, check_joints, comment, header, output_note
+from joulepath.optimizer.export.option_ranges import OPTION_RANGES
 from joulepath.optimizer.export.point_options import PointOptions
 from joulepath.optimizer.export.program import Move, Program, Timed
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.scalars import check_within
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,11 @@ class KrlOptions(PointOptions):
 
     digital_output: int | None = None
     """Number of an output that is on from each grasp to the release; None switches nothing."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.digital_output is not None:
+            check_within("digital_output", self.digital_output, OPTION_RANGES.krl_output)
 
 
 def to_krl(program: Program, options: KrlOptions | None = None) -> WrittenFile:

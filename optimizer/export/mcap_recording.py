@@ -22,11 +22,13 @@ from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.export.facts import WrittenFile
 from joulepath.optimizer.export.markers import Fields, markers, pose
+from joulepath.optimizer.export.option_ranges import OPTION_RANGES
 from joulepath.optimizer.export.program import Move, Program, Timed
 from joulepath.optimizer.export.quintic_points import NANOSECONDS, quintic_points
 from joulepath.optimizer.export.ros_messages import joint_trajectory
-from joulepath.optimizer.export.rows import times
+from joulepath.optimizer.export.rows import check_period, times
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.scalars import check_text
 
 STRING = "std_msgs/msg/String"
 FLOAT = "std_msgs/msg/Float64"
@@ -53,6 +55,10 @@ class McapOptions:
     """Time between two joint states [s]."""
     prefix: str = ""
     """Prefix of all names of joints and links."""
+
+    def __post_init__(self) -> None:
+        check_period(self.period)
+        check_text("prefix", self.prefix, OPTION_RANGES.prefix)
 
 
 def to_mcap(program: Program, options: McapOptions | None = None) -> WrittenFile:

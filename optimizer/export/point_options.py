@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.export.errors import FormatUnsuitable
+from joulepath.optimizer.export.option_ranges import OPTION_RANGES
+from joulepath.optimizer.problem.scalars import check_choice, check_within
 
 
 @dataclass(frozen=True)
@@ -20,6 +23,13 @@ class PointOptions:
     """Sign of each joint, 1 or -1; None for 1."""
     offsets: tuple[float, ...] | None = None
     """Offset of each joint [degrees]; None for 0."""
+
+    def __post_init__(self) -> None:
+        check_within("tolerance", self.tolerance, OPTION_RANGES.tolerance, "radians")
+        for sign in self.signs or ():
+            check_choice("signs", sign, Literal[1, -1])
+        for offset in self.offsets or ():
+            check_within("offsets", offset, OPTION_RANGES.offset, "degrees")
 
     def degrees(self, q: Array) -> list[str]:
         """Axes of joint positions (nq,) [rad], to 1e-6 degrees."""

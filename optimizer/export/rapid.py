@@ -7,17 +7,16 @@ total time of the movement [s].
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
-from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.even_points import EvenPoints, even_points, rounded, straight
 from joulepath.optimizer.export.facts import WrittenFile, check_joints, comment, header, output_note
+from joulepath.optimizer.export.option_ranges import OPTION_RANGES
 from joulepath.optimizer.export.point_options import PointOptions
 from joulepath.optimizer.export.program import Move, Program, Timed
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.scalars import check_text
 
-SIGNAL = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 """Names of signals in RAPID."""
 _NO_EXTERNAL_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 
@@ -40,6 +39,11 @@ class RapidOptions(PointOptions):
     digital_output: str | None = None
     """Name of a signal that is on from each grasp to the release; None switches nothing."""
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.digital_output is not None:
+            check_text("digital_output", self.digital_output, OPTION_RANGES.signal)
+
 
 def to_rapid(program: Program, options: RapidOptions | None = None) -> WrittenFile:
     """Write a program in RAPID.
@@ -54,10 +58,6 @@ def to_rapid(program: Program, options: RapidOptions | None = None) -> WrittenFi
     options = options or RapidOptions()
     check_joints(program, "rapid", 6, "ABB", "robots of ABB, with six joints")
     options.check("rapid", program.robot.nq)
-    if options.digital_output is not None and not SIGNAL.fullmatch(options.digital_output):
-        raise FormatUnsuitable(
-            "rapid", "rapid.digital_output must be the name of a signal: letters, digits and _."
-        )
     moves = [even_points(move, (straight, rounded), options.tolerance) for move in program.moves]
     notes = (
         f"within {max(each.deviation for each in moves):.2e} rad of the spline, if the controller "

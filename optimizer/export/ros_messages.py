@@ -14,8 +14,10 @@ from typing import Any, Literal
 import yaml
 
 from joulepath.optimizer.export.facts import WrittenFile, header
+from joulepath.optimizer.export.option_ranges import OPTION_RANGES
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.export.quintic_points import QuinticPoints, quintic_points
+from joulepath.optimizer.problem.scalars import check_choices, check_text
 
 Encoding = Literal["yaml", "json"]
 
@@ -45,6 +47,11 @@ class Ros2Options:
     prefix: str = ""
     """Prefix of all joint names."""
 
+    def __post_init__(self) -> None:
+        check_choices(self)
+        check_text("controller", self.controller, OPTION_RANGES.controller)
+        check_text("prefix", self.prefix, OPTION_RANGES.prefix)
+
 
 @dataclass(frozen=True)
 class MoveitOptions:
@@ -53,6 +60,10 @@ class MoveitOptions:
     encoding: Encoding = "yaml"
     prefix: str = ""
     """Prefix of all joint names."""
+
+    def __post_init__(self) -> None:
+        check_choices(self)
+        check_text("prefix", self.prefix, OPTION_RANGES.prefix)
 
 
 def to_ros2(program: Program, options: Ros2Options | None = None) -> WrittenFile:

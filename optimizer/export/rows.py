@@ -9,7 +9,9 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.export.errors import FormatUnsuitable
+from joulepath.optimizer.export.option_ranges import OPTION_RANGES
 from joulepath.optimizer.export.program import Program
+from joulepath.optimizer.problem.scalars import check_within
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,14 @@ class TableOptions:
 
     period: float = 0.008
     """Time between two rows [s]."""
+
+    def __post_init__(self) -> None:
+        check_period(self.period)
+
+
+def check_period(period: float) -> None:
+    """Check the period of a table [s]. Raises InvalidProblem if it is out of range."""
+    check_within("period", period, OPTION_RANGES.period, "seconds")
 
 
 def times(program: Program, period: float, format: str, most: int = TABLE.max_rows) -> Array:

@@ -20,11 +20,13 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.facts import WrittenFile, check_joints, comment, header, output_note
+from joulepath.optimizer.export.option_ranges import OPTION_RANGES
 from joulepath.optimizer.export.pieces import pieces
 from joulepath.optimizer.export.program import Move, Program, Timed
 from joulepath.optimizer.export.urscript_parts import CHECKS, serving
 from joulepath.optimizer.motion.spline import peak_rates
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.scalars import check_choices, check_within
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,13 @@ class UrscriptOptions:
     digital_output: int | None = None
     """Standard output that is on while the arm carries more than at the start; None switches
     nothing."""
+
+    def __post_init__(self) -> None:
+        check_choices(self)
+        check_within("lookahead_time", self.lookahead_time, OPTION_RANGES.lookahead_time, "seconds")
+        check_within("gain", self.gain, OPTION_RANGES.gain)
+        if self.digital_output is not None:
+            check_within("digital_output", self.digital_output, OPTION_RANGES.standard_output)
 
 
 def to_urscript(program: Program, options: UrscriptOptions | None = None) -> WrittenFile:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from itertools import chain
 from numbers import Real
+from re import fullmatch
 from reprlib import repr as short
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -54,6 +55,12 @@ def check_number(
         )
 
 
+def check_within(field: str, value: object, range: tuple[float, float], unit: str = "") -> None:
+    """Check that a value is a number between the ends of a range. Raises InvalidProblem if not."""
+    least, most = range
+    check_number(field, value, unit, least=least, most=most)
+
+
 def check_speed(field: str, value: object, least: float = 0.0) -> None:
     """Check an optional speed of a point of the arm [m/s]: above zero, and `least` or more.
 
@@ -81,6 +88,16 @@ def _described(unit: str, least: float, most: float, positive: bool) -> str:
     if positive:
         return f"a positive {number}"
     return f"a {number}, {least:g} or more"
+
+
+def check_text(field: str, value: object, pattern: str) -> None:
+    """Check that a value is a text that a regular expression matches as a whole.
+
+    Raises:
+        InvalidProblem: it is not.
+    """
+    if not (isinstance(value, str) and fullmatch(pattern, value)):
+        raise InvalidProblem(field, f"{field} must match {pattern}, not {short(value)}.")
 
 
 def check_choice(field: str, value: object, choices: Any) -> None:

@@ -7,23 +7,26 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from joulepath.app.exceptions.base import InvalidRequest
-from joulepath.app.schemas.common import Request, described
+from joulepath.app.schemas.common import Request, between, described
 from joulepath.app.schemas.given_answer import AnswerRequest
 from joulepath.optimizer.export.export import FORMATS, ExportOptions
 from joulepath.optimizer.export.formats import FormatName
+from joulepath.optimizer.export.option_ranges import OPTION_RANGES
 from joulepath.optimizer.export.ros_messages import Encoding
 
-Period = Annotated[float, Field(ge=1e-4, le=1.0)]
-PREFIX = r"^[A-Za-z0-9_/.-]*$"
-CONTROLLER = r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$"
-SIGNAL = r"^[A-Za-z][A-Za-z0-9_]{0,31}$"
+RANGES = OPTION_RANGES
+PREFIX, CONTROLLER, SIGNAL = (
+    f"^{pattern}$" for pattern in (RANGES.prefix, RANGES.controller, RANGES.signal)
+)
 ENCODING = "`yaml` or `json`. Null: `json` if the header `Accept` asks for it, else `yaml`."
 
 
 class TableOptions(Request):
     """Options of `csv` and `npz`."""
 
-    period: Period = described("Time between two rows.", "s", 0.004, default=0.008)
+    period: float = described(
+        "Time between two rows.", "s", 0.004, default=0.008, **between(RANGES.period)
+    )
 
 
 class McapOptions(TableOptions):
@@ -34,7 +37,6 @@ class McapOptions(TableOptions):
         None,
         "left_",
         default="",
-        max_length=64,
         pattern=PREFIX,
     )
 
@@ -57,18 +59,16 @@ class UrscriptOptions(Request):
         "s",
         0.05,
         default=0.1,
-        ge=0.03,
-        le=0.2,
+        **between(RANGES.lookahead_time),
     )
-    gain: float = described("servoj's `gain`.", "1", 500.0, default=300.0, ge=100, le=2000)
+    gain: float = described("servoj's `gain`.", "1", 500.0, default=300.0, **between(RANGES.gain))
     digital_output: int | None = described(
         "Standard digital output that is on from each grasp to the release. Null: none is "
         "switched.",
         None,
         0,
         default=None,
-        ge=0,
-        le=7,
+        **between(RANGES.standard_output),
     )
 
 
@@ -80,7 +80,6 @@ class LimitsOptions(Request):
         None,
         "left_",
         default="",
-        max_length=64,
         pattern=PREFIX,
     )
 
@@ -132,8 +131,7 @@ class PointsOptions(Request):
         "rad",
         0.002,
         default=0.005,
-        ge=1e-4,
-        le=0.1,
+        **between(RANGES.tolerance),
     )
     signs: Annotated[list[Literal[1, -1]], Field(min_length=1, max_length=16)] | None = described(
         "Sense of the controller's axes against the joints of the robot's model, one per joint. "
@@ -144,7 +142,8 @@ class PointsOptions(Request):
     )
     offsets: (
         Annotated[
-            list[Annotated[float, Field(ge=-360, le=360)]], Field(min_length=1, max_length=16)
+            list[Annotated[float, Field(**between(RANGES.offset))]],
+            Field(min_length=1, max_length=16),
         ]
         | None
     ) = described(
@@ -177,8 +176,7 @@ class KrlOptions(PointsOptions):
         None,
         1,
         default=None,
-        ge=1,
-        le=4096,
+        **between(RANGES.krl_output),
     )
 
 

@@ -94,11 +94,6 @@ def test_text_of_a_user_cannot_leave_its_comment(label: str) -> None:
         ] == []
 
 
-def test_a_signal_is_a_name() -> None:
-    with pytest.raises(FormatUnsuitable, match="name of a signal"):
-        to_rapid(one_move(OWN), RapidOptions(digital_output="do1;Stop"))
-
-
 @pytest.mark.parametrize(
     ("robot", "write"), [("iiwa14", to_krl), ("ur5e", to_krl), ("kr10_r1100", to_rapid)]
 )
@@ -113,7 +108,7 @@ def test_a_long_motion_has_a_bounded_program() -> None:
     program = Program(
         (Move(spline, arm), Rest(1.0), Move(random_spline(arm, 5, spline.control_points[-1]), arm))
     )
-    file = to_krl(program.slowed(1e-3), KrlOptions(1e-5))
+    file = to_krl(program.slowed(1e-3), KrlOptions(1e-4))
     assert len(file.content) < 200_000
     assert (
         deviation(program.slowed(1e-3), read_krl(file), through) <= stated(file) * 1.01 + ROUNDING
