@@ -137,8 +137,9 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     from joulepath.app.main import create_app
     from joulepath.app.settings import Settings
     from tests.app.live import COMPUTED, GRACE, LOCAL, WARM_UP
+    from tests.app.shared import migrated
 
-    database = f"sqlite:///{tmp_path_factory.mktemp('service')}/joulepath.db"
+    database = migrated(tmp_path_factory.mktemp("service"))
     settings = Settings(workers=2, queue_size=4, deadline_grace=GRACE, database_url=database)
     with TestClient(
         create_app(settings), base_url=LOCAL, raise_server_exceptions=False, headers=COMPUTED

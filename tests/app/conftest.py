@@ -12,6 +12,7 @@ from joulepath.app.store.store import Store
 from tests.app.databases import opened
 from tests.app.live import GRACE, Server, serving
 from tests.app.recorded import recorded_service
+from tests.app.shared import migrated
 
 
 @pytest.fixture
@@ -22,13 +23,13 @@ def anyio_backend() -> str:
 
 @pytest.fixture
 def url(tmp_path: Path) -> str:
-    """An empty database."""
-    return f"sqlite:///{tmp_path}/joulepath.db"
+    """A database without rows."""
+    return migrated(tmp_path)
 
 
 @pytest.fixture
 async def store(url: str) -> AsyncIterator[Store]:
-    """The store of an empty database."""
+    """The store of a database without rows."""
     async with opened(url) as store:
         yield store
 
@@ -46,6 +47,6 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
 
     It has a database of its own, because services on one database share their jobs.
     """
-    database = f"sqlite:///{tmp_path_factory.mktemp('recorded')}/joulepath.db"
+    database = migrated(tmp_path_factory.mktemp("recorded"))
     with recorded_service(database_url=database) as client:
         yield client

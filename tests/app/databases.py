@@ -13,6 +13,8 @@ from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
+
 from joulepath.app.store.store import Store
 from tests.app.live import free_port
 
@@ -44,6 +46,13 @@ def why_no_postgres() -> str | None:
     if os.geteuid() == 0 and "postgres" not in {user.pw_name for user in pwd.getpwall()}:
         return "PostgreSQL does not run as root, and there is no user postgres to run it as"
     return None
+
+
+needs_postgres = pytest.mark.skipif(why_no_postgres() is not None, reason=str(why_no_postgres()))
+on_both_databases = pytest.mark.parametrize(
+    "url", ["sqlite", pytest.param("postgres", marks=needs_postgres)], indirect=True
+)
+"""For tests of what differs most: locks, tables and types. `make test-long` runs all on both."""
 
 
 @dataclass

@@ -19,6 +19,7 @@ import httpx2
 
 from tests.app.forks import ROOT as ROOT
 from tests.app.forks import Fork
+from tests.app.shared import migrated
 
 LOCAL = "http://localhost"
 """Where a client in the same process finds the service: a name that it is always known by."""
@@ -108,9 +109,9 @@ class Server:
     def descendants(self) -> set[int]:
         """Process ids of the server's children, theirs, and so on."""
         found: set[int] = set()
-        parents = {self.process.pid}
+        parents, parent_of = {self.process.pid}, _parents()
         while parents:
-            parents = {pid for pid, parent in _parents().items() if parent in parents} - found
+            parents = {pid for pid, parent in parent_of.items() if parent in parents} - found
             found |= parents
         return found
 
@@ -179,8 +180,8 @@ def free_port() -> int:
 def serving(
     warm: bool = True, recorded: bool = False, by_command: bool = False, **settings: Any
 ) -> Iterator[Server]:
-    """A server with these settings, by default waited for until it is warm and with an empty
-    database of its own.
+    """A server with these settings, by default waited for until it is warm and with a
+    database of its own without rows.
 
     With `recorded`, its searches are recorded (see `tests.app.recorded`): it has no worker
     processes. With `by_command`, `joulepath serve` starts it, else `python -m joulepath.app`.
@@ -191,11 +192,9 @@ def serving(
     port = free_port()
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder, "log")
-        settings = {
-            "database_url": f"sqlite:///{folder}/joulepath.db",
-            "host": "127.0.0.1",
-            **settings,
-        }
+        settings = {"host": "127.0.0.1", **settings}
+        if "database_url" not in settings:
+            settings["database_url"] = migrated(Path(folder))
         environment = {f"JOULEPATH_{name.upper()}": str(value) for name, value in settings.items()}
         environment |= {"JOULEPATH_LOG_LEVEL": "debug", "PORT": str(port)}
         with log.open("ab") as appended:
@@ -226,17 +225,19 @@ def processor_time(pid: int) -> float:
 
 def alive(pid: int) -> bool:
     """Whether a process exists and is no zombie."""
-    return pid in _parents()
+    return _parent(pid) is not None
+
+
+def _parent(pid: int) -> int | None:
+    """Parent of a process; None if it has ended."""
+    try:
+        state, parent = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[:2]
+    except OSError:
+        return None
+    return None if state == "Z" else int(parent)
 
 
 def _parents() -> dict[int, int]:
     """Parent of every living process."""
-    parents = {}
-    for status in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            state, parent = status.read_text().rpartition(")")[2].split()[:2]
-        except OSError:  # it has just ended
-            continue
-        if state != "Z":
-            parents[int(status.parent.name)] = int(parent)
-    return parents
+    pids = [int(folder.name) for folder in Path("/proc").glob("[0-9]*")]
+    return {pid: parent for pid in pids if (parent := _parent(pid)) is not None}

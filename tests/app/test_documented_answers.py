@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+from functools import cache
 from typing import Any
 
 import pytest
 
 from tests.app.live import ROOT, Server
+from tests.app.requests import PATIENT
+from tests.selection import long_but
 
 ENERGY = 5e-3
 """Relative: the last digits of an optimum depend on the processor and on the compiler of the
@@ -87,8 +90,6 @@ SAID: list[tuple[str, str, str, dict[str, Any], str]] = [
             (r"[\d.]+ \| ([\d.]+) \| optimal", BOUND),
         )
     ),
-]
-SLOW: list[tuple[str, str, str, dict[str, Any], str]] = [
     (
         "docs/reference/tool_paths.md",
         r"a seam of 0.4 m needs ([\d.]+) J",
@@ -111,6 +112,13 @@ SLOW: list[tuple[str, str, str, dict[str, Any], str]] = [
         TOTAL,
     ),
 ]
+SLOW = {"optimize/seam_any_turn", "cycle/round_parts", "cycle/seam_any_turn"}
+# one bus and one position stand for all
+FURTHER = {"optimize/paper_position_2", "optimize/paper_position_3"}
+FURTHER_BUSES = (BUSES["isolated"], BUSES["shared"])
+QUICK = [
+    row for row in SAID if row[2] not in SLOW | FURTHER and row[3].get("bus") not in FURTHER_BUSES
+]
 # pages with a shortened answer, and its request
 SHOWN = {
     "README.md": "optimize/paper_pose_1",
@@ -119,9 +127,16 @@ SHOWN = {
 }
 
 
+@cache
+def computed(server: Server, request: str, changes: str) -> dict[str, Any]:
+    path, body = request.split("/")[0], json.loads((ROOT / f"examples/{request}.json").read_text())
+    patient = {} if path == "evaluate" else PATIENT
+    return server.post(f"/{path}", patient | body | json.loads(changes)).json()
+
+
 def answer_to(server: Server, request: str, changes: dict[str, Any]) -> dict[str, Any]:
-    body = json.loads((ROOT / f"examples/{request}.json").read_text())
-    return server.post(f"/{request.split('/')[0]}", body | changes).json()
+    """The answer to an example with changes, computed once for all that is said of it."""
+    return computed(server, request, json.dumps(changes))
 
 
 def stated(page: str, pattern: str) -> float:
@@ -132,7 +147,7 @@ def stated(page: str, pattern: str) -> float:
 
 @pytest.mark.parametrize(
     ("page", "pattern", "request_file", "changes", "field"),
-    [*SAID, *(pytest.param(*row, marks=pytest.mark.long) for row in SLOW)],
+    long_but(QUICK, SAID),
 )
 def test_a_number_in_the_text(
     server: Server, page: str, pattern: str, request_file: str, changes: dict[str, Any], field: str

@@ -249,6 +249,7 @@ def test_a_chain_that_is_finished_is_the_answer_once_the_time_is_up(
     assert all(each in search.solutions for each in search.pairs(nodes))
 
 
+@pytest.mark.long
 def test_the_given_order_is_the_answer_where_a_free_one_needs_more(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -53,6 +53,7 @@ def test_a_gripper_without_a_shape_is_said_to_be_in_the_table(client: TestClient
     )
 
 
+@pytest.mark.long
 def test_the_remedy_of_the_warning_works(client: TestClient) -> None:
     """With shapes, the goal in the table is refused; above it, the motion is clear without a
     warning.

@@ -11,6 +11,7 @@ import json
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from playwright.sync_api import Browser, Page, expect
 
@@ -53,7 +54,10 @@ MOVES = [
 def main() -> None:
     """Write the pictures into `docs`."""
     with (
-        serving(workers=1, deadline_grace=GRACE) as service,
+        TemporaryDirectory() as folder,
+        serving(
+            workers=1, deadline_grace=GRACE, database_url=f"sqlite:///{folder}/joulepath.db"
+        ) as service,
         chromium(*SOFTWARE) as browser,
     ):
         url = f"{service.url}/studio"

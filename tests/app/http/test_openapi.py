@@ -16,11 +16,12 @@ from joulepath import __version__
 from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.app.main import create_app
 from joulepath.app.settings import Settings
+from tests.app.documents import open_document
 
 
-@pytest.fixture(scope="module")
-def document(client: TestClient) -> dict[str, Any]:
-    return client.get("/openapi.json").json()
+@pytest.fixture
+def document() -> dict[str, Any]:
+    return open_document()
 
 
 def properties(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -131,6 +132,7 @@ def test_no_error_model_of_the_framework_is_left(document: dict[str, Any]) -> No
     assert "HTTPValidationError" not in repr(document)
 
 
+@pytest.mark.long
 def test_every_deadline_is_the_services() -> None:
     document = create_app(Settings(max_deadline=7.5)).openapi()
     bodies = {name: schema for name, schema in properties(document) if name.endswith(".deadline")}

@@ -88,8 +88,13 @@ def log(client: TestClient) -> str:
     return add_log(client)
 
 
-def test_a_log_becomes_figures(client: TestClient, log: str) -> None:
-    whole = ended(client, logs=[log])
+@pytest.fixture(scope="module")
+def whole(client: TestClient, log: str) -> Any:
+    """The identification of the log."""
+    return ended(client, logs=[log])
+
+
+def test_a_log_becomes_figures(client: TestClient, whole: Any) -> None:
     assert whole.result is not None, whole.problem
     result = whole.result
     found = {(each.figure, each.joint): each for each in result.parameters}
@@ -121,10 +126,8 @@ def test_a_log_becomes_figures(client: TestClient, log: str) -> None:
     assert answer.status_code == 200, answer.text
 
 
-def test_a_result_of_an_earlier_version_is_shown_with_empty_lists(
-    client: TestClient, log: str
-) -> None:
-    now = done(client, logs=[log]).model_dump(mode="json")
+def test_a_result_of_an_earlier_version_is_shown_with_empty_lists(whole: Any) -> None:
+    now = whole.result.model_dump(mode="json")
     assert now["measure"] and now["validation"]["energies"]
     stored = {name: value for name, value in now.items() if name != "measure"}
     validation = {**now["validation"]}
@@ -145,9 +148,9 @@ def residuals(client: TestClient, id: str) -> list[ResidualMove]:
 
 
 def test_residuals_are_those_of_moves_that_the_fit_has_not_seen(
-    client: TestClient, log: str
+    client: TestClient, log: str, whole: Any
 ) -> None:
-    found = ended(client, logs=[log])
+    found = whole
     assert found.result is not None and found.result.validation.fitted.torque is not None
     moves = residuals(client, found.id)
     blind = [move for move in moves if move.held_out]
@@ -192,8 +195,8 @@ def test_residuals_of_other_logs_are_held_out(client: TestClient, log: str) -> N
         assert (move.power is None) == (move.log == other)
 
 
+@pytest.mark.usefixtures("whole")
 def test_identifications_are_listed(client: TestClient, log: str) -> None:
-    ended(client, logs=[log])
     found = ended(client, logs=[log])
     first = IdentificationList.model_validate_json(client.get("/identifications?limit=1").content)
     assert [each.model_dump() for each in first.identifications] == [

@@ -9,9 +9,7 @@ import pytest
 from sqlalchemy import text
 
 from joulepath.app.store.database import create_database_engine
-from tests.app.databases import Postgres, postgres, why_no_postgres
-
-MISSING = why_no_postgres()
+from tests.app.databases import Postgres, needs_postgres, postgres
 
 
 @pytest.fixture(scope="session")
@@ -21,12 +19,7 @@ def server() -> Iterator[Postgres]:
 
 
 @pytest.fixture(
-    params=[
-        "sqlite",
-        pytest.param(
-            "postgres", marks=pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
-        ),
-    ]
+    params=["sqlite", pytest.param("postgres", marks=[needs_postgres, pytest.mark.long])]
 )
 def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     """An empty database."""

@@ -13,6 +13,7 @@ from joulepath.app.store import answers, cache
 from joulepath.app.store.cache import Answered, Asked
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import new_id
+from tests.app.databases import on_both_databases
 
 ASKED = Asked("a" * 64, 10.0)
 OTHER = Asked("b" * 64, 10.0)
@@ -43,6 +44,7 @@ async def test_what_takes_the_place_of_what(store: Store) -> None:
     assert await known(store, ASKED) == {"a": second}, "an optimal one stays"
 
 
+@on_both_databases
 async def test_two_that_remember_the_same_at_the_same_time(store: Store) -> None:
     has_written, may_end = threading.Event(), threading.Event()
 

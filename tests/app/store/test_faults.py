@@ -22,11 +22,11 @@ from joulepath.app.store import answers, studies
 from joulepath.app.store.database import create_database_engine
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import new_id
-from tests.app.databases import opened, postgres
+from tests.app.databases import needs_postgres, opened, postgres
 from tests.app.live import serving
 from tests.app.requests import move
 from tests.app.store.test_iterations import step
-from tests.app.store.test_store import MISSING, put, until_refused
+from tests.app.store.test_store import put, until_refused
 
 NEARLY_FULL = 24 << 20
 
@@ -146,7 +146,7 @@ async def test_too_little_room_is_told_by_its_code(store: Store) -> None:
     assert await refused(store, work) == "full"
 
 
-@pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
+@needs_postgres
 async def test_faults_of_postgresql_are_told_by_their_codes() -> None:
     with postgres() as server:
         other = create_database_engine(server.url)

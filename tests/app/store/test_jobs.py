@@ -21,6 +21,7 @@ from joulepath.app.store.jobs import NewJob, NewRequest
 from joulepath.app.store.leases import Lease, Outcome
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import Answer, JobEvent, JobRequest, new_id
+from tests.app.databases import on_both_databases
 
 MUCH = 1 << 30
 START = datetime(2030, 1, 1, tzinfo=UTC)
@@ -93,6 +94,7 @@ def bench(store: Store) -> Bench:
     return Bench(store)
 
 
+@on_both_databases
 async def test_a_lease_that_ran_out_is_taken_over_and_the_late_result_dropped(bench: Bench) -> None:
     job_id = await bench.create(1)
     (first,) = await bench.lease("a")
@@ -129,6 +131,7 @@ async def test_a_renewed_lease_is_kept(bench: Bench) -> None:
     assert await bench.store.read(partial(leases.kept, holder="a")) == {(lease.key, 1)}
 
 
+@on_both_databases
 async def test_many_holders_never_get_the_same_request(bench: Bench) -> None:
     """Services on one database lease every request once and number the events without gaps."""
 
@@ -195,6 +198,7 @@ async def test_the_owner_that_was_served_last_comes_last(
     assert set(order[:2]) == set(jobs_of) and order[2:] == order[:-2]
 
 
+@on_both_databases
 async def test_cancelling_ends_what_waits_and_then_what_runs(bench: Bench) -> None:
     job_id = await bench.create(4)
     first, second = await bench.lease("a", 2)
@@ -320,26 +324,26 @@ async def test_answers_live_as_long_as_their_job(bench: Bench) -> None:
 
 
 async def test_progress_comes_twice_a_second_at_most(bench: Bench) -> None:
-    job_id = await bench.create(100)
-    for _ in range(100):
+    job_id = await bench.create(30)
+    for _ in range(30):
         await bench.settle("a", *map(done, await bench.lease("a")))
         bench.now += timedelta(seconds=0.1)
     progress = [event.data for event in await bench.events(job_id) if event.name == "progress"]
-    assert 20 <= len(progress) <= 22
+    assert 6 <= len(progress) <= 8
     assert progress[0]["eta"] is None, "before 5 % is done"
     half = next(each for each in progress if each["progress"] >= 0.5)
-    assert half["eta"] == pytest.approx(5.0, rel=0.1)
+    assert half["eta"] == pytest.approx(1.5, abs=0.2)
     assert progress[-1]["progress"] == 1.0
     view = await bench.store.read(partial(jobs.view, job_id=job_id))
-    assert view.counts == {"waiting": 0, "running": 0, "done": 100, "failed": 0, "cancelled": 0}
+    assert view.counts == {"waiting": 0, "running": 0, "done": 30, "failed": 0, "cancelled": 0}
 
 
 async def test_progress_continues_after_the_clock_was_set_back(bench: Bench) -> None:
-    job_id = await bench.create(100)
-    for done_before in range(100):
-        bench.now -= timedelta(hours=1) if done_before == 50 else timedelta()
+    job_id = await bench.create(30)
+    for done_before in range(30):
+        bench.now -= timedelta(hours=1) if done_before == 15 else timedelta()
         await bench.settle("a", *map(done, await bench.lease("a")))
         bench.now += timedelta(seconds=0.1)
     progress = [event.data for event in await bench.events(job_id) if event.name == "progress"]
-    assert sum(each["progress"] > 0.5 for each in progress) >= 10
+    assert sum(each["progress"] > 0.5 for each in progress) >= 3
     assert all(each["eta"] is None for each in progress if each["progress"] > 0.5)

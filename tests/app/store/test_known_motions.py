@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 
 from joulepath.app.store import known_motions
 from joulepath.app.store.store import Store
+from tests.app.databases import on_both_databases
 
 CELL = "c" * 64
 OTHER = "d" * 64
@@ -41,6 +42,7 @@ async def test_each_cell_has_its_own_and_those_used_last_stay(store: Store) -> N
     assert await found(store, OTHER) == {"e": b"5"}
 
 
+@on_both_databases
 async def test_two_that_keep_the_same_at_the_same_time(url: str, store: Store) -> None:
     await keep(store, CELL, a=b"1")
     both = threading.Barrier(2, timeout=5)

@@ -18,6 +18,7 @@ from joulepath.app.store.jobs import NewJob, NewRequest
 from joulepath.app.store.shares import stored_key
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import Answer, OwnRobot, StoredLog, Study, new_id, now
+from tests.app.databases import on_both_databases
 from tests.app.store.test_store import A_DAY, migrate_to, put
 
 
@@ -68,6 +69,7 @@ async def test_no_client_takes_all_robots_figures_or_logs(store: Store) -> None:
         await store.write(partial(add, owner="cell"))
 
 
+@on_both_databases
 async def test_answers_of_a_client_with_few_outlive_a_flood(store: Store) -> None:
     kept = await store.write(partial(put, owner="cell"))
     flood = [await store.write(partial(put, owner="press")) for _ in range(5)]

@@ -35,13 +35,12 @@ from joulepath.app.store.database import create_database_engine, migrate, sqlite
 from joulepath.app.store.faults import OtherTables, OtherVersion, fault_of
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import Answer, JobRequest, Table, new_id, now
-from tests.app.databases import Postgres, opened, why_no_postgres
+from tests.app.databases import Postgres, needs_postgres, on_both_databases, opened
 from tests.app.forks import Fork
 from tests.app.live import ROOT, WARM_UP, Server, serving
 from tests.app.problems import checked
 from tests.app.requests import move
 
-MISSING = why_no_postgres()
 A_DAY = timedelta(days=1)
 MUCH = 1 << 30
 
@@ -78,6 +77,7 @@ def tables(url: str) -> list[Any]:
     return list(differences)
 
 
+@on_both_databases
 def test_migrations_make_what_the_models_say(url: str) -> None:
     migrate(create_database_engine(url))
     assert tables(url) == []
@@ -180,6 +180,7 @@ def test_a_folder_that_cannot_be_made_has_a_cause(number: int, told: str) -> Non
     assert fault_of(OSError(number, "of the folder"), None) == told
 
 
+@on_both_databases
 def test_several_processes_may_migrate_at_once(url: str) -> None:
     code = (
         "import os, sys; from joulepath.app.store.database import *; "
@@ -204,7 +205,7 @@ def test_a_new_file_that_another_process_makes_is_waited_for(tmp_path: Path) -> 
     other.close()
 
 
-@pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
+@needs_postgres
 async def test_a_service_waits_while_another_one_migrates(
     server: Postgres, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -238,6 +239,7 @@ async def test_a_service_waits_while_another_one_migrates(
     other.join()
 
 
+@on_both_databases
 async def test_answers_are_kept_whole(store: Store) -> None:
     body = json.dumps({"energy": [1.5] * 1000, "name": "größte"}).encode()
     before = now()
@@ -330,7 +332,7 @@ def test_without_its_database_the_service_goes_on(url: str) -> None:
         assert "secret-word" not in str(server.logged())
 
 
-@pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
+@needs_postgres
 async def test_a_database_that_comes_back_is_used_again(server: Postgres) -> None:
     async with opened(server.url) as store:
         answer_id = await store.write(put)
