@@ -32,6 +32,12 @@ OUTPUT: Callable[[Any], Any] = click.option(
     type=click.Path(dir_okay=False, path_type=Path),
     help="Write the answer to this file instead of standard output.",
 )
+MOVES: Callable[[Any], Any] = click.option(
+    "--answers",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    help="Folder with the answers of a cycle's moves, as `joulepath cycle --answers` writes it. "
+    "Default: the database.",
+)
 
 
 class Refused(Exception):
@@ -80,19 +86,27 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
         raise refused(invalid_request(error, "body"), request_id) from None
 
 
-def answered(task: Task, deadline: float, request_id: str) -> bytes:
-    """The answer of a task in at most `deadline` [s]. Raises Refused."""
-    result = result_of(task, deadline, request_id)
+def answered(task: Task, deadline: float, request_id: str, answers: Path | None = None) -> bytes:
+    """The answer of a task in at most `deadline` [s], with the answers of moves in a folder.
+
+    Raises Refused.
+    """
+    result = result_of(task, deadline, request_id, answers)
     return (result if result.kept_as is None else result.not_kept()).document
 
 
-def result_of(task: Task, deadline: float, request_id: str) -> TaskResult:
-    """The result of a task in at most `deadline` [s]. Raises Refused."""
+def result_of(
+    task: Task, deadline: float, request_id: str, answers: Path | None = None
+) -> TaskResult:
+    """The result of a task in at most `deadline` [s], with the answers of moves in a folder.
+
+    Raises Refused.
+    """
     from joulepath.app.cli.store import run_with_store
     from joulepath.optimizer.exceptions import DeclaredError
 
     try:
-        return run_with_store(task, deadline)
+        return run_with_store(task, deadline, answers)
     except DeclaredError as error:
         raise refused(error, request_id) from None
 

@@ -9,7 +9,16 @@ import click
 import orjson
 
 from joulepath.app.cli import terminal
-from joulepath.app.cli.answer import FILE, OUTPUT, content_of, new_id, result_of, validated, write
+from joulepath.app.cli.answer import (
+    FILE,
+    MOVES,
+    OUTPUT,
+    content_of,
+    new_id,
+    result_of,
+    validated,
+    write,
+)
 from joulepath.optimizer.export.formats import FORMAT_NAMES, FormatName
 
 # longest wall time of an export [s]; usual ones take milliseconds
@@ -21,11 +30,14 @@ DEADLINE = 120.0
 Examples:
   joulepath optimize request.json --output answer.json
   joulepath export urscript answer.json --speed-scale 0.1 --output slowly.script
-  joulepath export ros2 answer.json --set message=trajectory > trajectory.yaml"""
+  joulepath export ros2 answer.json --set message=trajectory > trajectory.yaml
+  joulepath cycle round.json --answers moves --output answer.json
+  joulepath export urscript answer.json --answers moves --output round.script"""
 )
 @click.argument("format", type=click.Choice(FORMAT_NAMES))
 @FILE
 @OUTPUT
+@MOVES
 @click.option(
     "--speed-scale",
     type=float,
@@ -40,13 +52,18 @@ Examples:
     help="An option of the format, JSON or a word.",
 )
 def export(
-    format: FormatName, file: str, output: Path | None, speed_scale: float, options: tuple[str, ...]
+    format: FormatName,
+    file: str,
+    output: Path | None,
+    answers: Path | None,
+    speed_scale: float,
+    options: tuple[str, ...],
 ) -> None:
     """Writes the motion of an answer as a file for a robot controller.
 
-    FILE is the JSON answer of `optimize`, of `evaluate` with a sample period, or of `POST /cycle`,
-    whose moves must be in the database; or - for standard input. If standard error is a terminal, a
-    summary follows: deviations of the file, and omitted parts.
+    FILE is the JSON answer of `optimize`, of `evaluate` with a sample period, or of `cycle`; or -
+    for standard input. If standard error is a terminal, a summary follows: deviations of the file,
+    and omitted parts.
     """
     from joulepath.app.api.export.request import ExportRequest, option_field
     from joulepath.app.api.export.task import ExportResult, ExportTask
@@ -64,7 +81,8 @@ def export(
     )
     request = validated(ExportRequest, body, request_id)
     with terminal.steps("Certifying the motion"):
-        result = result_of(ExportTask(request, format, False, request_id), DEADLINE, request_id)
+        task = ExportTask(request, format, False, request_id)
+        result = result_of(task, DEADLINE, request_id, answers)
     write(result.document, output)
     assert isinstance(result, ExportResult)
     notes = result.notes

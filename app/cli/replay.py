@@ -11,6 +11,7 @@ import orjson
 from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import (
     FILE,
+    MOVES,
     OUTPUT,
     answered,
     content_of,
@@ -29,6 +30,7 @@ Examples:
 )
 @FILE
 @OUTPUT
+@MOVES
 @click.option(
     "--arm",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
@@ -61,15 +63,16 @@ Examples:
 def replay(
     file: str,
     output: Path | None,
+    answers: Path | None,
     arm: Path | None,
     perturb: tuple[tuple[str, float], ...],
     **options: Any,
 ) -> None:
     """Plays the motion of an answer in MuJoCo, with a controller.
 
-    FILE is the JSON answer of `optimize`, of `evaluate` with a sample period, or of `POST /cycle`,
-    whose moves must be in the database; or - for standard input. If standard error is a terminal, a
-    summary follows: deviations, energies, contacts, savings.
+    FILE is the JSON answer of `optimize`, of `evaluate` with a sample period, or of `cycle`; or -
+    for standard input. If standard error is a terminal, a summary follows: deviations, energies,
+    contacts, savings.
     """
     from joulepath.app.api.replay.task import ReplayRequest, ReplayTask
 
@@ -79,7 +82,7 @@ def replay(
     request_id, deadline = new_id(), options["deadline"]
     request = validated(ReplayRequest, orjson.dumps(body), request_id)
     with terminal.steps(f"Replaying for at most {deadline:g} s"):
-        found = answered(ReplayTask(request, request_id), deadline, request_id)
+        found = answered(ReplayTask(request, request_id), deadline, request_id, answers)
     write(found, output)
     terminal.summary(lambda: summary_of(parsed(found)))
 

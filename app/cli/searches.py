@@ -116,20 +116,26 @@ def compare_summary(answer: dict[str, Any]) -> dict[str, str]:
 @click.command(
     epilog="""\b
 Example:
-  joulepath cycle examples/cycle/pick_and_place.json --output answer.json"""
+  joulepath cycle examples/cycle/pick_and_place.json --answers moves --output answer.json"""
 )
 @FILE
 @OUTPUT
-def cycle(file: str, output: Path | None) -> None:
+@FORMAT
+@ANSWERS
+def cycle(
+    file: str, output: Path | None, wanted: Literal["json", "csv"], answers: Path | None
+) -> None:
     """Finds the cycle of stops with least energy.
 
-    FILE is the JSON of `POST /cycle`, or - for standard input. The answer is JSON, too. If standard
-    error is a terminal, a summary follows: energy, duration, status, lower bound, gap and savings.
+    FILE is the JSON of `POST /cycle`, or - for standard input. The answer is JSON, or a CSV with
+    one line per sample. If standard error is a terminal, a summary follows: energy, duration,
+    status, lower bound, gap and savings.
     """
     from joulepath.app.api.cycle.request import CycleRequest
     from joulepath.app.api.cycle.task import CycleTask
 
-    search(CycleRequest, CycleTask, content_of(file), output, cycle_summary)
+    task = partial(CycleTask, wanted=wanted)
+    search(CycleRequest, task, content_of(file), output, cycle_summary, answers)
 
 
 def cycle_summary(answer: dict[str, Any]) -> dict[str, str]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -17,15 +19,27 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
-def run_with_store(task: Task, deadline: float) -> TaskResult:
+def run_with_store(task: Task, deadline: float, answers: Path | None = None) -> TaskResult:
     """The result of a task with its log, robot, figures and answers from the database.
 
-    Raises the error of the task; StoreUnavailable if the database is needed.
+    Args:
+        task: the task.
+        deadline: longest wall time [s].
+        answers: folder with the answers of a cycle's moves, as ID.json; moves that are missing
+            there are read from the database.
+
+    Raises:
+        StoreUnavailable: the database is needed.
+        DeclaredError: errors of the task.
+        click.FileError: the folder cannot be read.
     """
     from joulepath.app.exceptions.stored import PartsNeeded, UnknownFigures, UnknownLog
     from joulepath.app.tasks.arm_engine import Equipped, Needs
+    from joulepath.app.tasks.kept_answers import answers_given
     from joulepath.optimizer.exceptions import UnknownRobot
 
+    if answers is not None:
+        task = Equipped(task, (partial(answers_given, _answers_in(answers)),))
     needs, equipped = Needs(), task
     while True:
         try:
@@ -33,6 +47,16 @@ def run_with_store(task: Task, deadline: float) -> TaskResult:
         except (UnknownRobot, UnknownFigures, UnknownLog, PartsNeeded) as error:
             needs = needs.after(error)
         equipped = Equipped(task, in_store(needs.given))
+
+
+def _answers_in(folder: Path) -> dict[str, bytes]:
+    """The answers in a folder by their paths. Raises click.FileError."""
+    from joulepath.app.engine.result import path_of_answer
+
+    try:
+        return {path_of_answer(file.stem): file.read_bytes() for file in folder.glob("*.json")}
+    except OSError as error:
+        raise click.FileError(str(folder), error.strerror or "") from None
 
 
 def robot_named(name: str) -> Robot:

@@ -21,6 +21,11 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """Beginnings of the texts that spreadsheets compute."""
 
 
+def path_of_answer(id: str) -> str:
+    """Path of a kept answer in the service."""
+    return f"/answers/{id}"
+
+
 @dataclass(frozen=True)
 class StoredAnswer:
     """A complete answer as JSON, its id in the database, and its figures in lists.
@@ -40,7 +45,7 @@ class StoredAnswer:
     @property
     def path(self) -> str:
         """Path of the answer in the service."""
-        return f"/answers/{self.id}"
+        return path_of_answer(self.id)
 
 
 @dataclass(frozen=True)

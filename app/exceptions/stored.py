@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -59,7 +60,11 @@ class UnknownAnswer(ServiceError):
 
     status = 404
     title = "Unknown answer"
-    remedy = "To get it again, repeat the request that produced it."
+    remedy = (
+        "To get it again, repeat the request that produced it. The command line stores no answers: "
+        "`joulepath cycle --answers FOLDER` writes those of a cycle's moves, and `export` and "
+        "`replay` read them by the same option."
+    )
     detail = "No stored answer has this id: send the request that produced the answer again."
 
 
@@ -193,6 +198,11 @@ class UnknownLog(ServiceError):
 
     id: Annotated[str, Internal] = ""
     """The id in the request."""
+
+    def __str__(self) -> str:
+        # a text of any other form may be anything, also something secret: it is not repeated
+        is_id = re.fullmatch("[0-9a-f-]{36}", self.id) is not None
+        return f"No log has the id {self.id}: GET /logs lists all logs." if is_id else self.detail
 
 
 @dataclass(eq=False)

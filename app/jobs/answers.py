@@ -11,7 +11,7 @@ from typing import Any
 import orjson
 
 from joulepath.app.convert.packed import unpacked
-from joulepath.app.engine.result import csv_document
+from joulepath.app.engine.result import csv_document, path_of_answer
 from joulepath.app.http.problems import PREFIX
 from joulepath.app.store import jobs
 from joulepath.app.store.job_events import eta, progress
@@ -62,7 +62,7 @@ def summary(view: JobView) -> dict[str, Any]:
 def status(request: JobRequest) -> dict[str, Any]:
     """The fields of a request of a job."""
     names = ("name", "kind", "state", "attempt", "wall_time", "energy", "duration", "status")
-    answer = None if request.answer_id is None else f"/answers/{request.answer_id}"
+    answer = None if request.answer_id is None else path_of_answer(request.answer_id)
     own = {name: getattr(request, name) for name in names}
     return {"index": request.number, **own, "answer": answer, "problem": request.problem}
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from sqlalchemy import delete as delete_from
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, defer
@@ -26,12 +28,12 @@ def add(session: Session, log: StoredLog, most: int) -> None:
 
 def get(session: Session, log_id: str) -> StoredLog:
     """A log with its file. Raises UnknownLog."""
-    return by_id(session, StoredLog, log_id, UnknownLog)
+    return by_id(session, StoredLog, log_id, partial(UnknownLog, log_id))
 
 
 def about(session: Session, log_id: str) -> StoredLog:
     """A log without its file. Raises UnknownLog."""
-    return by_id(session, StoredLog, log_id, UnknownLog, options=[_LIGHT])
+    return by_id(session, StoredLog, log_id, partial(UnknownLog, log_id), options=[_LIGHT])
 
 
 def page(

@@ -9,6 +9,7 @@ import pytest
 
 from tests.app.cli.console import ROOT as PROJECT
 from tests.app.cli.console import Here, run
+from tests.app.recorded import CYCLE
 from tests.app.requests import move
 
 ANSWER = json.loads((PROJECT / "examples" / "export" / "urscript" / "slow_run.json").read_text())[
@@ -70,6 +71,22 @@ def test_an_altered_answer_is_a_problem_and_wrong_usage_is_told(here: Here, answ
     for wrong in (("--set", "form"), ("--speed-scale", "x")):
         assert here.run("export", "urscript", answer, *wrong)[0] == 2
     assert here.run("export", "json", answer, "--set", "form=points")[0] == 2
+
+
+def test_a_cycle_is_exported_and_replayed_without_a_database(here: Here, tmp_path: Path) -> None:
+    moves, cycle, table = (tmp_path / name for name in ("moves", "cycle.json", "cycle.csv"))
+    request = json.dumps(CYCLE)
+    written = ("--answers", str(moves), "--output", str(cycle))
+    assert here.run("cycle", "-", *written, stdin=request)[0] == 0
+    code, content = here.problem("export", "csv", str(cycle))
+    assert (code, content["type"]) == (1, "/problems/unknown-answer")
+    exported = ("export", "csv", str(cycle), "--answers", str(moves), "--output", str(table))
+    assert here.run(*exported)[0] == 0
+    last = table.read_text().splitlines()[-1].split(",")
+    assert float(last[0]) == pytest.approx(json.loads(cycle.read_text())["duration"])
+    options = ("--answers", str(moves), "--control", "pd", "--step", "1e-3")
+    code, replayed, _ = here.run("replay", str(cycle), *options)
+    assert code == 0 and len(json.loads(replayed)["motions"]) == len(list(moves.iterdir())) == 2
 
 
 def test_a_report_is_written_and_checked(tmp_path: Path) -> None:

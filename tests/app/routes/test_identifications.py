@@ -298,7 +298,11 @@ def test_torque_constants_need_a_payload_that_is_known(client: TestClient) -> No
 
 
 def test_unknown_logs_are_refused_at_once(client: TestClient, log: str) -> None:
-    refused(client.post("/identifications", json={"logs": [log, NOBODY]}), UnknownLog)
+    answer = client.post("/identifications", json={"logs": [log, NOBODY]})
+    refused(answer, UnknownLog)
+    assert NOBODY in answer.json()["detail"]
+    hidden = client.post("/identifications", json={"logs": [log, "a secret"]})
+    assert "secret" not in hidden.text
     refused(client.get(f"/identifications/{NOBODY}"), UnknownIdentification)
     refused(client.get("/identifications/x"), UnknownIdentification)
     refused(client.get("/identifications/x/residuals"), UnknownIdentification)
