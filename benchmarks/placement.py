@@ -38,10 +38,10 @@ from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.placement.place import place_robot
+from joulepath.optimizer.placement.place_solver import PlaceSolver
 from joulepath.optimizer.placement.placement import Placement, WeightedCycle
 from joulepath.optimizer.placement.placement_solution import PlacementSolution
 from joulepath.optimizer.placement.region import Moved, Region
-from joulepath.optimizer.placement.rounds import Rounds
 from joulepath.optimizer.placement.space import Space
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm, Payload
@@ -149,9 +149,9 @@ def exhaustive(placement: Placement) -> list[float]:
     Places with proven bounds above the least energy are left out.
     """
     space, energies = Space.of(replace(placement, resolution=GRID)), [np.inf]
-    rounds = Rounds(space, time.process_time)
+    solver = PlaceSolver(space, time.process_time)
     ample = Deadline.after(UNREACHED_DEADLINE, time.process_time)
-    reached = [rounds.checked(each, ample) for each in space.map()]
+    reached = [solver.checked(each, ample) for each in space.map()]
     reached = [each for each in reached if each.reason is None]
     for each in sorted(reached, key=lambda each: each.bound or 0.0):
         if each.bound is not None and each.bound >= min(energies):

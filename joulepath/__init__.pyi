@@ -75,9 +75,9 @@ from .optimizer.placement.errors import NoPlacement
 from .optimizer.placement.place import place
 from .optimizer.placement.placement import WeightedCycle
 from .optimizer.placement.placement_solution import (
+    FoundPlace,
     MapPoint,
     PlacedPose,
-    PlacedRound,
     PlacementSolution,
     Tolerance,
 )
@@ -203,6 +203,7 @@ __all__ = [
     "ExcitationInfeasible",
     "ExportedFile",
     "FormatUnsuitable",
+    "FoundPlace",
     "FrankaOptions",
     "FreeOrder",
     "Front",
@@ -267,7 +268,6 @@ __all__ = [
     "Payload",
     "PayloadUnknown",
     "PlacedPose",
-    "PlacedRound",
     "PlacementSolution",
     "Places",
     "PlannedBaseline",

@@ -162,7 +162,7 @@ TYPES = {
     "Outcome",
     "Payload",
     "PlacedPose",
-    "PlacedRound",
+    "FoundPlace",
     "PlacementSolution",
     "Places",
     "PlannedBaseline",

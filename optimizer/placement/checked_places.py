@@ -16,8 +16,8 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Deadline, end_if_stopped
+from joulepath.optimizer.placement.place_solver import PlaceResult, PlaceSolver
 from joulepath.optimizer.placement.refinement import PATTERN, Box, refined
-from joulepath.optimizer.placement.rounds import Round, Rounds
 from joulepath.optimizer.placement.space import Key, Place
 
 
@@ -42,21 +42,21 @@ class CheckedPlaces:
     """Memo of checks of places for reach and bound.
 
     Args:
-        rounds: checks the places.
+        solver: checks the places.
         box: ranges of the coordinates.
         spacing: distances between neighbours on the map, shape (n,) [m, rad].
     """
 
-    rounds: Rounds
+    solver: PlaceSolver
     box: Box
     spacing: Array
-    _memo: dict[Key, Round] = field(default_factory=dict)
+    _memo: dict[Key, PlaceResult] = field(default_factory=dict)
 
-    def check(self, place: Place, end: Deadline) -> Round:
+    def check(self, place: Place, end: Deadline) -> PlaceResult:
         """The lower bound at a place, or the reason why the place has no cycles; neither of them if
         the deadline passes first."""
         if place.key not in self._memo:
-            found = self.rounds.checked(place, end)
+            found = self.solver.checked(place, end)
             if end.passed:
                 return found
             self._memo[place.key] = found
@@ -67,7 +67,7 @@ class CheckedPlaces:
         known = self._memo.get(place.key)
         return None if known is None else known.bound
 
-    def least_bounds(self, starts: Sequence[Round], end: Deadline) -> Iterator[Round]:
+    def least_bounds(self, starts: Sequence[PlaceResult], end: Deadline) -> Iterator[PlaceResult]:
         """Local minima of the bound. The searches begin at the local minima on the map, and then at
         other places while a bound lower by `greatest_fall` would be the least of all.
 
@@ -89,19 +89,19 @@ class CheckedPlaces:
             choice = start.place.choice
             bound = partial(self._bound_at, choice, end)
             x, ended = refined(bound, start.place.x, self.box, step, finest)
-            found = self.check(self.rounds.space.place(choice, x), end)
+            found = self.check(self.solver.space.place(choice, x), end)
             least = min(least, np.inf if found.bound is None else found.bound)
             yield found
             if not ended:
                 return
 
-    def _minima(self, bounds: Mapping[Round, float]) -> set[Round]:
+    def _minima(self, bounds: Mapping[PlaceResult, float]) -> set[PlaceResult]:
         """Places of the map at which the bound is no greater than one step of one coordinate
         away."""
         steps = {each: self._steps(each.place.x) for each in bounds}
         at = {(each.place.choice, steps[each]): bound for each, bound in bounds.items()}
 
-        def around(place: Round) -> Iterator[float]:
+        def around(place: PlaceResult) -> Iterator[float]:
             """Bounds of the neighbours that have one."""
             numbers = steps[place]
             for k, number in enumerate(numbers):
@@ -122,5 +122,5 @@ class CheckedPlaces:
         end_if_stopped()
         if end.passed:
             return None
-        bound = self.check(self.rounds.space.place(choice, x), end).bound
+        bound = self.check(self.solver.space.place(choice, x), end).bound
         return np.inf if bound is None else bound

@@ -10,16 +10,16 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.known_motions import KnownMotions
 from joulepath.optimizer.deadline import Deadline, end_if_stopped
 from joulepath.optimizer.placement.nearby_chain import NEARBY
-from joulepath.optimizer.placement.rounds import Round, Rounds
+from joulepath.optimizer.placement.place_solver import PlaceResult, PlaceSolver
 from joulepath.optimizer.placement.space import Place
 
 
 class NearbyEnergy:
-    """Energies at places, through configurations near the ones of a known round.
+    """Energies at places, through configurations near the ones of known cycles.
 
     Args:
-        rounds: computes the rounds.
-        start: round at the first place.
+        solver: computes the cycles at places.
+        start: the result at the first place.
         end: deadline.
         solve: finds the best cycles at a place. It is called far from the place of its last call,
             and in the absence of nearby configurations.
@@ -28,15 +28,15 @@ class NearbyEnergy:
 
     def __init__(
         self,
-        rounds: Rounds,
-        start: Round,
+        solver: PlaceSolver,
+        start: PlaceResult,
         end: Deadline,
-        solve: Callable[[Place], Round],
+        solve: Callable[[Place], PlaceResult],
         estimates: bool = False,
     ) -> None:
-        self.rounds, self.end, self.solve = rounds, end, solve
+        self.solver, self.end, self.solve = solver, end, solve
         self.known, self.least = start, np.inf
-        self._estimates = estimates and rounds.can_estimate
+        self._estimates = estimates and solver.can_estimate
         self._memo: dict[bytes, float] = {}
 
     def __call__(self, x: Array) -> float | None:
@@ -46,28 +46,28 @@ class NearbyEnergy:
             return None
         key = np.round(x, 9).tobytes()
         if key not in self._memo:
-            value = self._energy(self.rounds.space.place(self.known.place.choice, x))
+            value = self._energy(self.solver.space.place(self.known.place.choice, x))
             if value is None and self.end.left < 0:
                 return None
             self._memo[key] = np.inf if value is None else value
         return self._memo[key]
 
     def _energy(self, place: Place) -> float | None:
-        rounds, known = self.rounds, self.known
-        cycles = rounds.nearby(place, known.visited) if self._is_near(place) else None
+        solver, known = self.solver, self.known
+        cycles = solver.nearby(place, known.visited) if self._is_near(place) else None
         if cycles is None:
             known = self.solve(place)
-            cycles = rounds.nearby(place, known.visited)
+            cycles = solver.nearby(place, known.visited)
         elif not self._estimates:
-            known = rounds.solved(place, self.end, KnownMotions(), cycles=cycles)
+            known = solver.solved(place, self.end, KnownMotions(), cycles=cycles)
         estimates = self._estimates and cycles is not None
-        value = rounds.estimated(cycles or [], self.end) if estimates else known.energy
+        value = solver.estimated(cycles or [], self.end) if estimates else known.energy
         if value is not None and value < self.least:
             self.known, self.least = known, value
         return value
 
     def _is_near(self, place: Place) -> bool:
         """Whether the best cycles of a place are likely in the known configurations."""
-        scale = [axis.scale for axis in self.rounds.space.axes]
+        scale = [axis.scale for axis in self.solver.space.axes]
         away = np.abs((place.x - self.known.place.x) / scale).max(initial=0.0)
         return bool(away <= NEARBY.reach)

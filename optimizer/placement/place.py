@@ -13,17 +13,17 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Clock
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.placement.place_solver import PlaceResult
 from joulepath.optimizer.placement.placement import Placement, WeightedCycle
 from joulepath.optimizer.placement.placement_search import PlacementSearch
 from joulepath.optimizer.placement.placement_solution import (
+    FoundPlace,
     MapPoint,
     PlacedPose,
-    PlacedRound,
     PlacementSolution,
     Tolerance,
 )
 from joulepath.optimizer.placement.region import Coordinate, Group, Moved, Places, Region
-from joulepath.optimizer.placement.rounds import Round
 from joulepath.optimizer.placement.space import Place, Space
 from joulepath.optimizer.presentation.gap import optimality_gap
 from joulepath.optimizer.presentation.progress_bar import progress_bar
@@ -132,9 +132,9 @@ def _solution(search: PlacementSearch, wall_time: float) -> PlacementSolution:
     )
 
 
-def _placed(search: PlacementSearch, found: Round) -> PlacedRound:
+def _placed(search: PlacementSearch, found: PlaceResult) -> FoundPlace:
     assert found.energy is not None
-    return PlacedRound(
+    return FoundPlace(
         **_poses(search.space, found.place),
         energy=found.energy,
         duration=search.duration(found),
@@ -143,7 +143,7 @@ def _placed(search: PlacementSearch, found: Round) -> PlacedRound:
     )
 
 
-def _point(space: Space, found: Round) -> MapPoint:
+def _point(space: Space, found: PlaceResult) -> MapPoint:
     return MapPoint(
         **_poses(space, found.place),
         energy=found.energy,

@@ -1,4 +1,4 @@
-"""Search for the place of least energy: reach first, then bounds, then rounds, then refinement."""
+"""Search for the place of least energy: reach first, then bounds, then cycles, then refinement."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from joulepath.optimizer.placement.box_bound import box_bound
 from joulepath.optimizer.placement.checked_places import CheckedPlaces
 from joulepath.optimizer.placement.errors import NoPlacement, ReasonCounts
 from joulepath.optimizer.placement.nearby_energy import NearbyEnergy
+from joulepath.optimizer.placement.place_solver import PlaceResult, PlaceSolver, Reason
 from joulepath.optimizer.placement.placement import Placement
 from joulepath.optimizer.placement.refinement import PATTERN, Box, refined
 from joulepath.optimizer.placement.region_bound import region_bound
-from joulepath.optimizer.placement.rounds import Reason, Round, Rounds
 from joulepath.optimizer.placement.space import Key, Place, Space
 from joulepath.optimizer.placement.tolerances import tolerances
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell
@@ -46,10 +46,10 @@ class PlacementSearchSettings:
     measured: float = 0.97
     """Share until which the tolerance is computed."""
     usual_times: float = 6.0
-    """Multiple of the mean time of a round that any round may take, so that one place among
+    """Multiple of the mean time of a place that any place may take, so that one place among
     obstacles does not take the time of many."""
     least_time: float = 1.0
-    """Time that any round may take [s]."""
+    """Time that any place may take [s]."""
     starts: int = 3
     """Most places of the map from which the search is refined."""
     apart: float = 0.75
@@ -80,9 +80,9 @@ class PlacementSearch:
         self.space, self.tell = Space.of(placement), tell
         self.clock, self.deadline = clock, placement.deadline
         self.end = Deadline.after(placement.deadline, clock)
-        self.rounds = Rounds(self.space, clock)
+        self.solver = PlaceSolver(self.space, clock)
         self.points = self.space.map()
-        self.map = [Round(place) for place in self.points]
+        self.map = [PlaceResult(place) for place in self.points]
         self.lower_bound = region_bound(self.space)
         self.spacing = self.space.spacing
         axes = self.space.axes
@@ -91,12 +91,12 @@ class PlacementSearch:
             np.array([axis.high for axis in axes]),
             np.array([axis.scale for axis in axes]),
         )
-        self.checked = CheckedPlaces(self.rounds, self.box, self.spacing)
+        self.checked = CheckedPlaces(self.solver, self.box, self.spacing)
         self._times = list[float]()
-        self._memo: dict[Key, Round] = {}
+        self._memo: dict[Key, PlaceResult] = {}
         self._known = KnownMotions()
-        self.best: Round | None = None
-        self.nominal: Round
+        self.best: PlaceResult | None = None
+        self.nominal: PlaceResult
         self.tolerance: Array | None = None
         self.is_refined = False
 
@@ -126,7 +126,7 @@ class PlacementSearch:
     @property
     def evaluated(self) -> int:
         """Number of places at which the cycles were computed or estimated."""
-        return self.rounds.evaluated
+        return self.solver.evaluated
 
     @property
     def left_out(self) -> int:
@@ -142,7 +142,7 @@ class PlacementSearch:
         """Least energy found [J]; inf without one."""
         return np.inf if self.best is None or self.best.energy is None else self.best.energy
 
-    def _promises(self, found: Round) -> bool:
+    def _promises(self, found: PlaceResult) -> bool:
         """Whether a place may need little more energy than the best one.
 
         The bound from its check is scaled by the least ratio of energy to such a bound among the
@@ -157,8 +157,8 @@ class PlacementSearch:
         ratios = [energy / bound for energy, bound in bounds if bound is not None and bound > 0]
         return found.bound is None or not ratios or min(ratios) * found.bound <= most
 
-    def _solved(self, place: Place, end: Deadline, compared: bool = False) -> Round:
-        """The rounds at a place, known ones or new ones; the best are kept."""
+    def _solved(self, place: Place, end: Deadline, compared: bool = False) -> PlaceResult:
+        """The cycles at a place, known ones or new ones; the best are kept."""
         end_if_stopped()
         key = place.key
         if key in self._memo:
@@ -167,7 +167,7 @@ class PlacementSearch:
             usual = SEARCH.usual_times * float(np.mean(self._times))
             end = end.within(max(SEARCH.least_time, usual))
         known, began = KnownMotions(), self.clock()
-        found = self.rounds.solved(place, end, known, compared)
+        found = self.solver.solved(place, end, known, compared)
         if found.is_decided:
             self._memo[key] = found.summary
         # a place out of reach takes no time, and says nothing of others
@@ -178,11 +178,11 @@ class PlacementSearch:
             self.tell(Improved(found.energy, self.duration(found), self.lower_bound))
         return found
 
-    def duration(self, found: Round) -> float:
+    def duration(self, found: PlaceResult) -> float:
         """Duration of the cycles at a place, times their weights [s]."""
         return sum(
             weight * each.duration
-            for weight, each in zip(self.rounds.weights, found.solutions, strict=True)
+            for weight, each in zip(self.solver.weights, found.solutions, strict=True)
         )
 
     def _check_points(self) -> None:
@@ -218,7 +218,7 @@ class PlacementSearch:
             found = self._solved(self.points[k], end)
             self.map[k] = found.summary
             if not found.is_decided:
-                self.map[k] = Round(self.points[k], bound=bound)
+                self.map[k] = PlaceResult(self.points[k], bound=bound)
                 continue
             self._tell_point(k)
 
@@ -233,7 +233,7 @@ class PlacementSearch:
             return
         for start in self._starts():
             energy = NearbyEnergy(
-                self.rounds, start, end, lambda place: self._solved(place, end), estimates=True
+                self.solver, start, end, lambda place: self._solved(place, end), estimates=True
             )
             step = PATTERN.first_step * self.spacing
             x, ended = refined(energy, start.place.x, self.box, step)
@@ -242,7 +242,7 @@ class PlacementSearch:
                 return
         self.is_refined = True
 
-    def _starts(self) -> Iterator[Round]:
+    def _starts(self) -> Iterator[PlaceResult]:
         """Places to refine from: the best one, then others far from all before."""
         taken = list[Place]()
         found = [each for each in self._memo.values() if each.energy is not None]
@@ -274,10 +274,10 @@ class PlacementSearch:
         best = self.best
         assert best is not None and best.energy is not None
         energy = NearbyEnergy(
-            self.rounds,
+            self.solver,
             best,
             end,
-            lambda place: self.rounds.solved(place, end, KnownMotions()),
+            lambda place: self.solver.solved(place, end, KnownMotions()),
         )
         step = self.spacing / 2
         self.tolerance = tolerances(energy, best.place.x, best.energy, self.box, step)
@@ -287,7 +287,7 @@ class PlacementSearch:
         assert self.best is not None and self.best.energy is not None
         if self.best.place is self.nominal.place or self.end.passed:
             return
-        found = self.rounds.solved(self.best.place, self.end, self._known, compared=True)
+        found = self.solver.solved(self.best.place, self.end, self._known, compared=True)
         if found.energy is not None and found.energy <= self.best.energy * (1 + SEARCH.same):
             self.best = found
 

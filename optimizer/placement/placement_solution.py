@@ -10,8 +10,8 @@ import numpy as np
 
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.declared import Count, Internal, Joules, Metres, Ratio, Seconds, Unit
+from joulepath.optimizer.placement.place_solver import Reason
 from joulepath.optimizer.placement.region import Coordinate, Mount
-from joulepath.optimizer.placement.rounds import Reason
 from joulepath.optimizer.presentation.chart import Chart
 from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.problem.cycle import Cycle
@@ -31,7 +31,7 @@ class PlacedPose:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlacedRound:
+class FoundPlace:
     """A place, and what the cycles need there."""
 
     base: PlacedPose
@@ -97,9 +97,9 @@ class SolvedPlacement:
     """`complete`: every place of the map was decided, and no neighbour of the best place is better.
     A better place between the places of the map may still exist: see `optimality_gap`. `cut_short`:
     the deadline ended the search before."""
-    best: PlacedRound
+    best: FoundPlace
     """The place of least energy that was found; never dearer than the nominal one."""
-    nominal: PlacedRound | None
+    nominal: FoundPlace | None
     """The nominal place; null where its cycles cannot be run."""
     nominal_reason: Reason | None
     """Why the nominal place has no cycles, as in `map`. Null if it has, and where there was no time

@@ -21,7 +21,7 @@ from joulepath.app.tasks.answer_collector import AnswerCollector
 from joulepath.optimizer.declared import NotEmpty
 from joulepath.optimizer.placement.place import place_robot
 from joulepath.optimizer.placement.placement_solution import (
-    PlacedRound,
+    FoundPlace,
     PlacementSolution,
     SolvedPlacement,
 )
@@ -42,7 +42,7 @@ class PlacedCycle:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlacedCycles(PlacedRound):
+class PlacedCycles(FoundPlace):
     """A place, and the cycles at this place."""
 
     cycles: Annotated[list[PlacedCycle], NotEmpty]
@@ -93,7 +93,7 @@ class PlacementTask:
         stored, asked = collector.stored, sent(self.request)
         return TaskResult.of_kept_json(answer, answer.figures, stored, asked)
 
-    def _placed(self, found: PlacedRound, collector: AnswerCollector) -> PlacedCycles:
+    def _placed(self, found: FoundPlace, collector: AnswerCollector) -> PlacedCycles:
         """A place, with the answers of its cycles collected."""
         placed = list[PlacedCycle]()
         asked = [each.cycle for each in self.request.weighted]

@@ -33,8 +33,8 @@ from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from joulepath.optimizer.kinematics.tcp import flange_pose
 from joulepath.optimizer.placement.box_bound import _CycleBoxes, _PlaceBoxBound, box_bound
 from joulepath.optimizer.placement.extents import Extents
+from joulepath.optimizer.placement.place_solver import PLACE_SOLVER
 from joulepath.optimizer.placement.placement import Placement
-from joulepath.optimizer.placement.rounds import ROUNDS
 from joulepath.optimizer.placement.space import Space
 from tests.optimizer.kinematics.axis_patterns import redrawn, robot_of, shifted
 from tests.optimizer.placement.cells import at, down, two_stops
@@ -116,7 +116,9 @@ def test_every_configuration_is_in_a_box(robot: str, region: str, base: np.ndarr
 @pytest.mark.parametrize("region", long_but(("listed",), REGIONS))
 def test_no_cycle_needs_less_than_the_bound(region: str, robot: str) -> None:
     own_arm = Arm(robot=load_robot(robot))
-    cycle = two_stops(arm=own_arm, with_baselines=False, unsolved_excess=ROUNDS.unsolved_excess)
+    cycle = two_stops(
+        arm=own_arm, with_baselines=False, unsolved_excess=PLACE_SOLVER.unsolved_excess
+    )
     space, rng, found = space_of(cycle, REGIONS[region]), np.random.default_rng(1), 0
     bound = box_bound(space, NEVER)
     assert bound is not None

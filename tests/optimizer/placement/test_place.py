@@ -30,10 +30,10 @@ from joulepath.optimizer.deadline import NEVER, Clock, Deadline
 from joulepath.optimizer.placement import placement_search
 from joulepath.optimizer.placement.nearby_chain import Visited
 from joulepath.optimizer.placement.place import place_robot
+from joulepath.optimizer.placement.place_solver import PlaceResult, PlaceSolver
 from joulepath.optimizer.placement.placement import Placement
 from joulepath.optimizer.placement.placement_search import PlacementSearch
 from joulepath.optimizer.placement.refinement import Box
-from joulepath.optimizer.placement.rounds import Round, Rounds
 from joulepath.optimizer.placement.space import Place, Space
 from joulepath.optimizer.placement.tolerances import TOLERANCE, tolerances
 from joulepath.optimizer.progress import Event, no_listener
@@ -50,8 +50,8 @@ def check(found: PlacementSolution) -> None:
     assert found.lower_bound is not None
     for energy in [found.best.energy, *(each.energy for each in found.map if each.energy)]:
         assert found.lower_bound <= energy
-    for round in [found.best, *([] if found.nominal is None else [found.nominal])]:
-        for solution in round.solutions:
+    for one in [found.best, *([] if found.nominal is None else [found.nominal])]:
+        for solution in one.solutions:
             assert all(move.solution.certificate.valid for move in solution.moves)
     for each in found.map:
         assert each.energy is None or each.reason is None
@@ -198,15 +198,15 @@ def bound_at(x: Array) -> float:
     return 100.0 + 10.0 * float(x[0] - x[1]) - (15.0 if in_reach else 0.0)
 
 
-class GivenRounds(Rounds):
-    """Rounds without cycles: the bound is `bound_at`, and the energy a multiple of the bound."""
+class GivenBounds(PlaceSolver):
+    """Places without cycles: the bound is `bound_at`, and the energy a multiple of the bound."""
 
     def __init__(self, space: Space, clock: Clock) -> None:
         super().__init__(space, clock)
         self.weights = []
 
-    def checked(self, place: Place, end: Deadline) -> Round:
-        return Round(place, bound=bound_at(place.x))
+    def checked(self, place: Place, end: Deadline) -> PlaceResult:
+        return PlaceResult(place, bound=bound_at(place.x))
 
     def solved(
         self,
@@ -215,10 +215,10 @@ class GivenRounds(Rounds):
         known: KnownMotions,
         compared: bool = False,
         cycles: Sequence[Cycle] | None = None,
-    ) -> Round:
+    ) -> PlaceResult:
         self.evaluated += 1
         bound = bound_at(place.x)
-        return Round(place, energy=RATIO * bound, bound=bound)
+        return PlaceResult(place, energy=RATIO * bound, bound=bound)
 
     def nearby(self, place: Place, near: Sequence[Visited]) -> list[Cycle] | None:
         return None
@@ -234,12 +234,12 @@ def test_bounds_are_descended_from_local_minima_and_from_where_they_may_fall_bel
     place qualifies on the steep slope, and all places up to 111 J qualify on the gentle slope.
     """
 
-    def checked(_: Rounds, place: Place, end: Deadline) -> Round:
+    def checked(_: PlaceSolver, place: Place, end: Deadline) -> PlaceResult:
         low, high = (float(np.abs(place.x - corner).sum()) for corner in (-0.25, 0.25))
-        return Round(place, bound=min(100.0 + slope * low, 112.0 + slope * high))
+        return PlaceResult(place, bound=min(100.0 + slope * low, 112.0 + slope * high))
 
-    monkeypatch.setattr(GivenRounds, "checked", checked)
-    monkeypatch.setattr(placement_search, "Rounds", GivenRounds)
+    monkeypatch.setattr(GivenBounds, "checked", checked)
+    monkeypatch.setattr(placement_search, "PlaceSolver", GivenBounds)
     region = Region(x=(-0.25, 0.25), y=(-0.25, 0.25))
     placement = Placement(
         cycles=[WeightedCycle(two_stops())], moved=[Moved(region)], resolution=0.25
@@ -259,7 +259,7 @@ def test_a_place_between_those_of_the_map_is_found_by_its_bound(
     placement = Placement(
         cycles=[WeightedCycle(two_stops())], moved=[Moved(region)], resolution=0.25
     )
-    monkeypatch.setattr(placement_search, "Rounds", GivenRounds)
+    monkeypatch.setattr(placement_search, "PlaceSolver", GivenBounds)
     search = PlacementSearch(placement, still, no_listener)
     search.run()
     assert search.best is not None and search.best.energy is not None

@@ -1,4 +1,4 @@
-"""The rounds at a place: the cycles of least energy, or the reason why there are none."""
+"""The cycles of least energy at a place, or the reason why there are none."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Reason = Literal["reach", "collision", "torque", "time", "motion"]
 
 
 @dataclass(frozen=True)
-class RoundsSettings:
+class PlaceSolverSettings:
     """Settings of the cycles at places."""
 
     unsolved_excess: float = 0.16
@@ -51,7 +51,7 @@ class RoundsSettings:
     0.25, five needed up to 5.7 % more, for 31 % less time."""
 
 
-ROUNDS = RoundsSettings()
+PLACE_SOLVER = PlaceSolverSettings()
 
 REASONS: tuple[tuple[type[JoulepathError], Reason], ...] = (
     (UnreachablePose, "reach"),
@@ -72,7 +72,7 @@ REASONS: tuple[tuple[type[JoulepathError], Reason], ...] = (
 
 
 @dataclass(frozen=True, eq=False)
-class Round:
+class PlaceResult:
     """Result of the search at a place.
 
     Attributes:
@@ -94,8 +94,8 @@ class Round:
     visited: tuple[Visited, ...] = ()
 
     @property
-    def summary(self) -> Round:
-        """The round without its solutions and its error, to save memory."""
+    def summary(self) -> PlaceResult:
+        """The result without its solutions and its error, to save memory."""
         return replace(self, solutions=(), error=None)
 
     @property
@@ -113,8 +113,8 @@ def reason_of(error: JoulepathError) -> Reason | None:
     return next((reason for kind, reason in REASONS if isinstance(error, kind)), None)
 
 
-class Rounds:
-    """Computes the rounds at places.
+class PlaceSolver:
+    """Computes the cycles at places.
 
     Args:
         space: the places.
@@ -126,7 +126,7 @@ class Rounds:
         self.evaluated = 0
         self.weights = [each.weight for each in space.placement.cycles]
 
-    def checked(self, place: Place, end: Deadline) -> Round:
+    def checked(self, place: Place, end: Deadline) -> PlaceResult:
         """Whether the stops can be reached at a place, and a lower bound.
 
         Args:
@@ -134,7 +134,7 @@ class Rounds:
             end: deadline.
 
         Returns:
-            A round with a reason, or with a bound alone. The bound is None if none is known for
+            A result with a reason, or with a bound alone. The bound is None if none is known for
             all configurations.
         """
         total: float | None = 0.0
@@ -142,11 +142,11 @@ class Rounds:
             try:
                 bound = self._bound(replace(cycle, deadline=max(end.left, _LEAST)))
             except DeadlineExceeded:
-                return Round(place)
+                return PlaceResult(place)
             except JoulepathError as error:
                 return _failed(place, error)
             total = None if total is None or bound is None else total + weight * bound
-        return Round(place, bound=total)
+        return PlaceResult(place, bound=total)
 
     def _bound(self, cycle: Cycle) -> float | None:
         """Lower bound [J] of a cycle at its place; None if it takes as long as the cycle itself."""
@@ -172,8 +172,8 @@ class Rounds:
         known: KnownMotions,
         compared: bool = False,
         cycles: Sequence[Cycle] | None = None,
-    ) -> Round:
-        """The rounds at a place.
+    ) -> PlaceResult:
+        """The cycles at a place.
 
         Args:
             place: the place.
@@ -184,7 +184,7 @@ class Rounds:
             cycles: the cycles to solve; None for the cycles of the place.
 
         Returns:
-            The round; without energy and reason if there was no time for all cycles.
+            The result; without energy and reason if there was no time for all cycles.
         """
         self.evaluated += 1
         found, energy = list[CycleSolution](), 0.0
@@ -195,25 +195,25 @@ class Rounds:
                 cycle,
                 deadline=min(cycle.deadline, share),
                 with_baselines=compared,
-                unsolved_excess=0.0 if compared else ROUNDS.unsolved_excess,
+                unsolved_excess=0.0 if compared else PLACE_SOLVER.unsolved_excess,
                 bound="normal" if compared else "plain",
             )
             try:
                 with knowing(known):
                     solution = plan_cycle(asked, self.clock, no_listener, progress=False)
             except DeadlineExceeded as error:
-                return Round(place, error=error)
+                return PlaceResult(place, error=error)
             except JoulepathError as error:
                 return _failed(place, error)
             if not all(move.solution.certificate.valid for move in solution.moves):
-                return Round(place, error=NoTrajectory([]), reason="motion")
+                return PlaceResult(place, error=NoTrajectory([]), reason="motion")
             found.append(solution)
             energy += weight * solution.energy.of(solution.objective)
         bound = sum(
             weight * each.lower_bound for weight, each in zip(self.weights, found, strict=True)
         )
         visited = map(Visited, map(visited_configurations, found), self.space.stops(place))
-        return Round(place, energy, tuple(found), bound=bound, visited=tuple(visited))
+        return PlaceResult(place, energy, tuple(found), bound=bound, visited=tuple(visited))
 
     @property
     def can_estimate(self) -> bool:
@@ -231,8 +231,8 @@ class Rounds:
     def estimated(self, cycles: Sequence[Cycle], end: Deadline) -> float | None:
         """Energy [J] of cycles with the first motion of every move, neither refined nor certified.
 
-        Of cycles through given configurations, it takes about a third of the time of the rounds,
-        and is greater by 0.5 to 1.5 %, nearly the same at neighbouring places.
+        Of cycles through given configurations, it takes about a third of the time of certified
+        cycles, and is greater by 0.5 to 1.5 %, nearly the same at neighbouring places.
 
         Args:
             cycles: the cycles, all with `can_estimate`.
@@ -279,8 +279,8 @@ _LEAST = 1e-3
 """Least deadline of a cycle [s]."""
 
 
-def _failed(place: Place, error: JoulepathError) -> Round:
+def _failed(place: Place, error: JoulepathError) -> PlaceResult:
     reason = reason_of(error)
     if reason is None:
         raise error
-    return Round(place, reason=reason, error=error)
+    return PlaceResult(place, reason=reason, error=error)
