@@ -24,7 +24,7 @@ MILLIMETRES = 1e-3
 """Unit of some of the files [m]."""
 FARTHEST: tuple[Vector, Vector] = (-np.inf, -np.inf, -np.inf), (np.inf, np.inf, np.inf)
 """The cell that is the whole space."""
-FLANGE = 0.0315
+FLANGE_RADIUS = 0.0315
 """Radius of the flange to which the tools are bolted, ISO 9409-1-50-4-M6 [m]."""
 
 
@@ -148,7 +148,7 @@ def on_flange(points: Array) -> Mask:
     """Whether points (k, 3) [m] of the flange frame are in the flange of the arm, out of reach of
     obstacles.
     """
-    return np.asarray((points[:, 2] < 0) & (np.hypot(points[:, 0], points[:, 1]) < FLANGE))
+    return np.asarray((points[:, 2] < 0) & (np.hypot(points[:, 0], points[:, 1]) < FLANGE_RADIUS))
 
 
 def _placed(*xyz_yaw: float) -> pin.SE3:

@@ -22,7 +22,7 @@ from joulepath.app.cli.answer import (
 from joulepath.optimizer.export.formats import FORMAT_NAMES, FormatName
 
 # longest wall time of an export [s]; usual ones take milliseconds
-DEADLINE = 120.0
+EXPORT_DEADLINE = 120.0
 
 
 @click.command(
@@ -82,7 +82,7 @@ def export(
     request = validated(ExportRequest, body, request_id)
     with terminal.steps("Certifying the motion"):
         task = ExportTask(request, format, False, request_id)
-        result = result_of(task, DEADLINE, request_id, answers)
+        result = result_of(task, EXPORT_DEADLINE, request_id, answers)
     write(result.document, output)
     assert isinstance(result, ExportResult)
     notes = result.notes

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 RESOURCES = "joulepath-"
 """Prefix of the resources of all versions."""
-LOOK = 0.2
+CHECK_PERIOD = 0.2
 """Time [s] between two checks of Dask's interest and of new events."""
 _WANTED = ("executing", "long-running", "resumed")
 """States of a wanted task in a Dask worker."""
@@ -74,7 +74,7 @@ async def compute(asked: list[Asked], key: str, topic: str) -> list[Ended]:
     working = asyncio.create_task(_all(works, ended, engine))
     try:
         while not working.done() and _is_wanted(worker, key):
-            await asyncio.wait({working}, timeout=LOOK)
+            await asyncio.wait({working}, timeout=CHECK_PERIOD)
             if found:
                 worker.log_event(topic, {"key": key, "events": pickle.dumps(found)})
                 found.clear()

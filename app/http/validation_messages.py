@@ -38,8 +38,15 @@ _MESSAGES = {
     "string_type": "Give a text, in double quotes",
     "int_parsing": "Give a whole number",
     "float_parsing": "Give a number",
+    "greater_than": "Give a number above {gt:g}",
+    "greater_than_equal": "Give a number of at least {ge:g}",
+    "less_than": "Give a number below {lt:g}",
+    "less_than_equal": "Give a number of at most {le:g}",
+    "literal_error": "Give {expected}",
+    "string_too_short": "Give a text with a length of at least {min_length}",
+    "string_too_long": "Give a text with a length of at most {max_length}",
 }
-"""Messages replacing those of pydantic, which name Python types."""
+"""Messages with parts of pydantic's context, replacing its own, which name no remedy."""
 _PATTERNS = {
     BASE64: "Give base64 in the standard alphabet, without line breaks and blanks",
     NO_CONTROLS: "Leave out line breaks, tabs and other control characters",
@@ -90,7 +97,8 @@ def _message(error: Mapping[str, Any]) -> str:
         bound = context["max_length" if is_long else "min_length"]
         items = f"{bound} item{'' if bound == 1 else 's'}"
         return f"Give at {'most' if is_long else 'least'} {items}, not {context['actual_length']}"
-    return str(_MESSAGES.get(error["type"], error["msg"]))
+    message = _MESSAGES.get(error["type"])
+    return str(error["msg"]) if message is None else message.format(**context)
 
 
 @cache

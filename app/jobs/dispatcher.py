@@ -55,7 +55,7 @@ class DispatcherSettings:
 
 DISPATCHER = DispatcherSettings()
 
-PRUNING = 3600.0
+PRUNING_PERIOD = 3600.0
 """Time [s] between two deletions of old jobs."""
 
 
@@ -308,7 +308,7 @@ class Dispatcher:
             for each in held:
                 if (each.lease.key, each.lease.attempt) not in kept:
                     each.drop()
-        if self._times.pruned is None or clock - self._times.pruned >= PRUNING:
+        if self._times.pruned is None or clock - self._times.pruned >= PRUNING_PERIOD:
             prune = partial(jobs.prune, max_age=timedelta(days=self._settings.answers_max_age))
             await self._store.write(prune, frees=True)
             self._times.pruned = clock

@@ -78,7 +78,7 @@ class InFlight:
             del self._works[asked]
 
 
-PATIENCE = 0.25
+QUERY_TIMEOUT = 0.25
 """Longest time [s] of a query, in view of the time saved."""
 
 
@@ -135,7 +135,7 @@ class AnswerCache:
         if cell is None or self.by_passed or self.store.fault is not None:
             return {}
         try:
-            async with asyncio.timeout(PATIENCE):
+            async with asyncio.timeout(QUERY_TIMEOUT):
                 return await self.store.read(partial(known_motions.find, cell=cell))
         except (StoreUnavailable, TimeoutError):
             return {}
@@ -154,7 +154,7 @@ class AnswerCache:
         if asked is None or self.by_passed:
             return None
         try:
-            async with asyncio.timeout(PATIENCE):
+            async with asyncio.timeout(QUERY_TIMEOUT):
                 known = await self.store.read(partial(_with_document, asked=asked))
         except (StoreUnavailable, TimeoutError):
             return None

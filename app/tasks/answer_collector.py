@@ -13,7 +13,7 @@ from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.optimizer.presentation.declared_fields import shown_fields
 from joulepath.optimizer.result.solution import Solution
 
-MOST_BYTES = 1 << 26
+LARGEST_ANSWERS = 1 << 26
 """Largest total size [byte] of the answers of one result, before compression."""
 
 
@@ -35,7 +35,7 @@ class AnswerCollector:
             The path of the answer.
 
         Raises:
-            InvalidRequest: the answers together exceed `MOST_BYTES`.
+            InvalidRequest: the answers together exceed `LARGEST_ANSWERS`.
         """
         answer_id = str(uuid.uuid4())
         own = {"id": answer_id, "answer": StoredAnswer(answer_id, b"").path}
@@ -43,7 +43,7 @@ class AnswerCollector:
         kept = replace(content, **{name: own[name] for name in own.keys() & shown_fields(kind)})
         answer = StoredAnswer(answer_id, json_document(kept), content.figures, endpoint, asked)
         self._answers.append(answer)
-        if sum(len(each.body) for each in self._answers) > MOST_BYTES:
+        if sum(len(each.body) for each in self._answers) > LARGEST_ANSWERS:
             message = (
                 "The answers are too large together: use a longer `sample_period`, or ask for fewer"
             )

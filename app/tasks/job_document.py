@@ -11,7 +11,7 @@ from joulepath.app.store import jobs
 
 JOBS = "/jobs"
 """Begin of the path of a job."""
-MOST_BYTES = 64_000_000
+LARGEST_DOCUMENT = 64_000_000
 """Largest document [byte]. The service holds it twice, and a worker parsed, some 500 MB: with
 answers to short motions, of 50 kB each, these are 1,300 requests."""
 
@@ -20,17 +20,17 @@ def job_document(session: Session, job_id: str, most: int) -> bytes:
     """The job as JSON: `name`, and `rows` with `index`, `name`, `kind`, `state`, `request`,
     `answer` and `problem`.
 
-    Raises UnknownJob, or InvalidRequest for more than `most` requests or `MOST_BYTES`.
+    Raises UnknownJob, or InvalidRequest for more than `most` requests or `LARGEST_DOCUMENT`.
     """
     job = jobs.view(session, job_id).job
     if job.total > most:
         raise _too_large(f"{most:,} requests")
-    rows, left = [], MOST_BYTES
+    rows, left = [], LARGEST_DOCUMENT
     for row, body in jobs.whole(session, job_id):
         request, answer = unpacked(row.body), None if body is None else unpacked(body)
         left -= len(request) + len(answer or b"")
         if left < 0:
-            raise _too_large(f"{MOST_BYTES / 1e6:.0f} MB of requests and answers")
+            raise _too_large(f"{LARGEST_DOCUMENT / 1e6:.0f} MB of requests and answers")
         rows.append(
             {
                 "index": row.number,

@@ -25,7 +25,7 @@ from joulepath.models.shape_sizes import WrongSize, check_lengths
 from joulepath.models.uploads.limits import Checkpoint
 from joulepath.models.urdf import BASE
 
-SHORT = 1e-3
+SHORT_SHARE = 1e-3
 """Length over radius below which the capsule of a link is a ball."""
 _FRAME = "x1, y1, z1, x2, y2, z2 of the axis' ends in the link frame, radius."
 
@@ -138,7 +138,7 @@ def _between_joints(upright: UprightChain, k: int, radius: float) -> Rows:
     end = (*upright.placements, upright.flange)[k].translation
     length = float(np.linalg.norm(end))
     # One radius away from both joints: it ends at the beginning of the next link's capsule.
-    share = min(0.5, radius / length) if length > SHORT * radius else 0.5
+    share = min(0.5, radius / length) if length > SHORT_SHARE * radius else 0.5
     return [[*(share * end).tolist(), *((1 - share) * end).tolist(), radius]]
 
 

@@ -19,7 +19,7 @@ NAME = "joulepath-report.json"
 """Name of the attachment."""
 MARK = "joulepath_report"
 """Field identifying the document."""
-MOST_BYTES = 1 << 28
+LARGEST_BUNDLE = 1 << 28
 """Largest unpacked document [byte]."""
 COMPUTED = "Computed, not measured. Never run on hardware by us."
 _SCRIPT = re.compile(rb'<script type="application/json" id="%s">([^<]*)</script>' % MARK.encode())
@@ -134,6 +134,6 @@ def _candidates(file: bytes) -> Iterator[bytes]:
 def _unpacked(content: bytes) -> bytes:
     """The content of a zlib stream; empty if it is none."""
     try:
-        return zlib.decompressobj().decompress(content, MOST_BYTES)
+        return zlib.decompressobj().decompress(content, LARGEST_BUNDLE)
     except zlib.error:
         return b""

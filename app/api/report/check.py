@@ -32,11 +32,11 @@ from joulepath.optimizer.export.program import Move
 from joulepath.optimizer.result.energy import ENERGY_PARTS
 
 Json = dict[str, Any]
-ENERGY_TOLERANCE = 1e-3
+RECOMPUTED_TOLERANCE = 1e-3
 """Relative difference of an energy and the same one computed from its motion."""
 ANSWER_TOLERANCE = 5e-3
 """Relative difference of the energies of two answers on different machines."""
-ROUNDING = 1e-9
+SUM_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def _motions(bundle: Bundle) -> list[Line]:
         electrical = answer["energy"]["electrical"]
         stated = electrical["total"] - electrical["dwell"]
         found = Plant(move.arm).energy(move.spline).electrical.total
-        lines.append(_line(f"energy of {label}", stated, found, ENERGY_TOLERANCE))
+        lines.append(_line(f"energy of {label}", stated, found, RECOMPUTED_TOLERANCE))
     return [Line("limits", f"{len(lines)} motions certified again", True), *lines] if lines else []
 
 
@@ -137,7 +137,7 @@ def _placed_sums(bundle: Bundle) -> Iterator[Line]:
             row["weight"] * row["answer"]["energy"][objective]["total"]
             for row in rows_at(bundle, place)
         )
-        yield _sum(f"cycles, {place} place", bundle.answer[place]["energy"], parts, ROUNDING)
+        yield _sum(f"cycles, {place} place", bundle.answer[place]["energy"], parts, SUM_TOLERANCE)
 
 
 def _sums(bundle: Bundle) -> Iterator[Line]:
@@ -148,17 +148,21 @@ def _sums(bundle: Bundle) -> Iterator[Line]:
     if bundle.kind == "evaluate":
         total, segments = bundle.answer["total"], bundle.answer["segments"]
         if segments:
-            yield _sum("segments", _electrical(total), map(_electrical, segments), ENERGY_TOLERANCE)
+            yield _sum(
+                "segments", _electrical(total), map(_electrical, segments), RECOMPUTED_TOLERANCE
+            )
         return
     total = bundle.answer["energy"]["electrical"]["total"]
     if bundle.kind == "optimize":
         parts = bundle.answer["energy"]["electrical"]
-        yield _sum("parts", total, (parts[name] for name in ENERGY_PARTS), ENERGY_TOLERANCE)
+        yield _sum("parts", total, (parts[name] for name in ENERGY_PARTS), RECOMPUTED_TOLERANCE)
     elif bundle.kind == "cycle":
-        yield _sum("legs", total, (leg["electrical"] for leg in bundle.answer["legs"]), ROUNDING)
+        yield _sum(
+            "legs", total, (leg["electrical"] for leg in bundle.answer["legs"]), SUM_TOLERANCE
+        )
     else:
         own = summed(bundle.moves)["energy"]["electrical"]["total"]
-        yield _line("sum of the rows", total, own, ROUNDING)
+        yield _line("sum of the rows", total, own, SUM_TOLERANCE)
 
 
 def _electrical(part: Json) -> float:
@@ -202,7 +206,7 @@ def _read_again(bundle: Bundle, request_id: str) -> Iterator[Line]:
         )
         if stated is not None and own is not None:
             words = {"electrical": "measured by power", "by_efforts": "measured by efforts"}
-            yield _line(f"{words.get(name, name)}, anew", stated, own, ENERGY_TOLERANCE)
+            yield _line(f"{words.get(name, name)}, anew", stated, own, RECOMPUTED_TOLERANCE)
 
 
 def _anew(kind: str, request: Json, answer: Json, request_id: str, what: str) -> Line:

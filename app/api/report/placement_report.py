@@ -26,7 +26,7 @@ from joulepath.optimizer.placement.mounts import yaw_of
 from joulepath.optimizer.problem.pose import Pose
 
 Json = dict[str, Any]
-MOST_ROWS = 500
+MOST_PLACES = 500
 """Most places of the table; a map may have 20,000."""
 _COULD = {
     "reach": "a stop is out of reach",
@@ -212,7 +212,7 @@ def _table(answer: Json) -> Table:
     return Table(
         title="The places of the map",
         note="Least: what the cycles at this place cannot need less than."
-        + (f" The best {MOST_ROWS} of {len(places):,}." if len(places) > MOST_ROWS else ""),
+        + (f" The best {MOST_PLACES} of {len(places):,}." if len(places) > MOST_PLACES else ""),
         head=("place", "J", "least, J"),
         rows=tuple(
             (_name(answer, each), REASONS[each["reason"]][1])
@@ -222,7 +222,7 @@ def _table(answer: Json) -> Table:
                 digits(each["energy"]),
                 "–" if each["lower_bound"] is None else down(each["lower_bound"]),
             )
-            for each in places[:MOST_ROWS]
+            for each in places[:MOST_PLACES]
         ),
         words=1,
     )

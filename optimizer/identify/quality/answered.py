@@ -22,7 +22,7 @@ from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 from joulepath.optimizer.problem.arm import Arm
 
-MAX_ROWS = 2000
+CHOSEN_ROWS = 2000
 """Largest number of rows whose energy is differentiated."""
 
 
@@ -53,13 +53,13 @@ class AnsweredEnergies:
     def gradient(self, rows: Rows) -> Array:
         """Derivatives of the energy of the rows with respect to the figures.
 
-        Uses evenly chosen rows if there are more than `MAX_ROWS`, with their weights scaled to the
-        same time.
+        Uses evenly chosen rows if there are more than `CHOSEN_ROWS`, with their weights scaled to
+        the same time.
 
         Returns:
             Derivatives, shape (p,) [J per unit of the figure].
         """
-        every = -(-len(rows.q) // MAX_ROWS)
+        every = -(-len(rows.q) // CHOSEN_ROWS)
         part = rows.take(np.arange(len(rows.q)) % every == 0)
         weight = part.weight * float(rows.weight.sum()) / float(part.weight.sum())
         torque = self.fitted.link_torque(part)

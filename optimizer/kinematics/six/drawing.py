@@ -18,7 +18,7 @@ from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.six.stretched_wrist import StretchedWrist
 from joulepath.optimizer.problem.branches import Label
 
-ROUNDING = 1e-14
+LEAST_ENTRY = 1e-14
 """Largest difference of a pose from the identity by rounding [m, 1]."""
 
 
@@ -55,13 +55,13 @@ class Drawing:
 
 def without_rounding(T: NDArray[np.floating[Any]]) -> Array:
     """The pose T (4, 4), or the identity exactly if it differs by rounding alone."""
-    return np.eye(4) if np.abs(T - np.eye(4)).max() < ROUNDING else np.asarray(T, dtype=float)
+    return np.eye(4) if np.abs(T - np.eye(4)).max() < LEAST_ENTRY else np.asarray(T, dtype=float)
 
 
 def angles_without_rounding(q: Array) -> Array:
     """Angles q (n,) [rad] in [-pi, pi]; angles within rounding of zero become exactly zero."""
     q = wrapped(q)
-    return np.where(np.abs(q) < ROUNDING, 0.0, q)
+    return np.where(np.abs(q) < LEAST_ENTRY, 0.0, q)
 
 
 @dataclass(frozen=True, eq=False)

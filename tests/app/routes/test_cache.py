@@ -33,7 +33,7 @@ KNOWN = {"Cache-Control": "max-age=60"}
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Raises the patience with the store for a busy machine."""
-    monkeypatch.setattr(answer_cache, "PATIENCE", 60.0)
+    monkeypatch.setattr(answer_cache, "QUERY_TIMEOUT", 60.0)
 
 
 def sent(client: TestClient, body: Any, **headers: str) -> Any:
@@ -160,7 +160,7 @@ async def test_keys_tell_clients_kinds_and_robots_apart(store: Store) -> None:
 async def test_a_database_that_hangs_is_not_waited_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(answer_cache, "PATIENCE", 0.1)
+    monkeypatch.setattr(answer_cache, "QUERY_TIMEOUT", 0.1)
 
     class Hanging(Store):
         async def read(self, work: Any) -> Any:

@@ -102,7 +102,7 @@ def test_savings_of_a_job_are_those_of_its_moves(page: bytes) -> None:
 def test_a_job_too_large_for_the_memory_is_refused(
     client: TestClient, job: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(job_document, "MOST_BYTES", 10_000)
+    monkeypatch.setattr(job_document, "LARGEST_DOCUMENT", 10_000)
     answer = client.post("/report", json={"job": job})
     assert answer.status_code == 422, answer.text
     (error,) = answer.json()["errors"]

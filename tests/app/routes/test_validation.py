@@ -237,6 +237,22 @@ def objects(document: Any) -> Iterator[dict[str, Any]]:
             yield from objects(each)
 
 
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"duration": -1.0}, "Give a number of at least 0.001"),
+        ({"duration": 1e9}, "Give a number of at most 600"),
+        ({"objective": "time"}, "Give 'electrical' or 'mechanical'"),
+        ({"robot": "r" * 100}, "Give a text with a length of at most 64"),
+    ],
+)
+def test_the_range_of_a_field_is_told_as_a_remedy(
+    client: TestClient, fields: dict[str, Any], said: str
+) -> None:
+    (error,) = client.post("/optimize", json=move() | fields).json()["errors"]
+    assert error["msg"] == said
+
+
 def test_names_only_the_first_of_many_errors(client: TestClient) -> None:
     limits = {name: ["x"] * 16 for name in ("velocity", "acceleration", "jerk", "torque")}
     assert len(refused(client, move(limits=limits))) == 20

@@ -305,7 +305,7 @@ def test_refuses_a_base_that_cannot_be(client: TestClient) -> None:
 
 
 def test_answers_that_are_too_large_together_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(answer_collector, "MOST_BYTES", 150)
+    monkeypatch.setattr(answer_collector, "LARGEST_ANSWERS", 150)
     collector = AnswerCollector()
     paths = [collector.add(Answer(request="a", robot="ur5e")) for _ in range(2)]
     assert len(set(paths)) == len(collector.stored) == 2

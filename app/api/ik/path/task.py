@@ -31,7 +31,7 @@ from joulepath.optimizer.kinematics.tool_path.path_following import PathPoint, f
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import DURATIONS
 
-MOST_POINTS = 1000
+MOST_PATH_POINTS = 1000
 """Largest number of points of a path."""
 
 
@@ -39,13 +39,14 @@ class IKPathRequest(RobotWithTcp):
     """Positions or poses of the TCP over time, as exactly one of `points` and `poses`."""
 
     t: Annotated[
-        list[Annotated[float, Field(ge=0, le=1e6)]], Field(min_length=1, max_length=MOST_POINTS)
+        list[Annotated[float, Field(ge=0, le=1e6)]],
+        Field(min_length=1, max_length=MOST_PATH_POINTS),
     ] = described(
         "Time of each point; each later than the previous one by 1 µs or more.",
         "s",
         [0.0, 0.5, 1.0],
     )
-    points: Annotated[list[Vector3], Field(min_length=1, max_length=MOST_POINTS)] | None = (
+    points: Annotated[list[Vector3], Field(min_length=1, max_length=MOST_PATH_POINTS)] | None = (
         described(
             "Positions [x, y, z] of the TCP in `frame`. The orientation is free.",
             "m",
@@ -54,7 +55,7 @@ class IKPathRequest(RobotWithTcp):
         )
     )
     frame: Frame = frame_of("`points`; each of `poses` has its own")
-    poses: Annotated[list[BasePose], Field(min_length=1, max_length=MOST_POINTS)] | None = (
+    poses: Annotated[list[BasePose], Field(min_length=1, max_length=MOST_PATH_POINTS)] | None = (
         described(
             "Poses of the TCP, each in the robot's base frame or in its `frame`.",
             None,
