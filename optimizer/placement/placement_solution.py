@@ -98,9 +98,9 @@ class SolvedPlacement:
     A better place between the places of the map may still exist: see `optimality_gap`. `cut_short`:
     the deadline ended the search before."""
     best: FoundPlace
-    """The place of least energy that was found; never dearer than the nominal one."""
+    """The best place found. It never needs more energy than the nominal place."""
     nominal: FoundPlace | None
-    """The nominal place; null where its cycles cannot be run."""
+    """The nominal place; null if its cycles are infeasible, or were not found in time."""
     nominal_reason: Reason | None
     """Why the nominal place has no cycles, as in `map`. Null if it has, and where there was no time
     for them."""

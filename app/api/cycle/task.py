@@ -44,7 +44,6 @@ class CycleAnswer(SolvedCycle, Answer):
     method: MethodName
     """How the moves are parametrised."""
     legs: Annotated[list[CycleLeg], NotEmpty]
-    """Moves and dwells in their order."""
     warnings: list[str]
     """Remarks on the cycle and on its moves, as in `POST /optimize`, with the ends of the move.
     Empty if there are none."""

@@ -114,14 +114,8 @@ class EvaluateAnswer(EvaluatedMotion, MotionAnswer):
     """The energy of a given motion, and its violated limits."""
 
     total: EvaluatedInterval
-    """The whole motion."""
     segments: list[EvaluatedInterval]
-    """Segments between configurations. A trajectory is one segment, and a log has one per move and
-    rest. Empty if there are more than 10,000. Up to 200 segments have intervals of their
-    electrical energies."""
     cycles: list[EvaluatedInterval]
-    """Cycles of a log that repeats, from the first on, each of whole segments. Empty for other
-    motions, and for a log that does not repeat."""
     warnings: list[str]
     """Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2
     mm, one names them, their distance without margins, and the time. Others report possibly missed

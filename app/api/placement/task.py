@@ -54,9 +54,7 @@ class PlacementAnswer(SolvedPlacement, Answer):
     """The placement of least energy: best place, nominal place and the map of the region."""
 
     best: PlacedCycles
-    """The best place found. It never needs more energy than the nominal place."""
     nominal: PlacedCycles | None
-    """The nominal place; null if its cycles are infeasible."""
     warnings: list[str]
     """Remarks on the placement. Empty if there are none."""
     answer: str | None = None
