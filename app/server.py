@@ -7,9 +7,11 @@ import ctypes
 import errno
 import logging
 import math
+import os
 import socket
 import sys
 import threading
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, cast
@@ -21,6 +23,7 @@ from joulepath.app.access.start import log_access
 from joulepath.app.engine.imports import keep
 from joulepath.app.http.connection import Connection, Connections
 from joulepath.app.main import create_app
+from joulepath.app.schemas.names import nearest
 from joulepath.app.settings import Settings, WrongSettings
 
 logger = logging.getLogger(__name__)
@@ -47,6 +50,8 @@ class ServerSettings:
 
 SERVER = ServerSettings()
 
+_OTHER_VARIABLES = ("CACHE_DIR", "URL", "API_KEY")
+"""Variables with the prefix of the settings that the library and the commands read."""
 _M_MMAP_THRESHOLD = -3
 """Parameter of glibc's `mallopt`: the least size of separately mapped blocks [byte]."""
 _REMEDIES = {
@@ -93,6 +98,18 @@ class _Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
+def log_unknown_variables(environment: Mapping[str, str]) -> None:
+    """Warns of variables with the prefix of the settings that set nothing."""
+    prefix = Settings.model_config["env_prefix"]
+    known = {*(name.upper() for name in Settings.model_fields), *_OTHER_VARIABLES}
+    for variable in sorted(environment):
+        name = variable.upper().removeprefix(prefix)
+        if variable.upper().startswith(prefix) and name not in known:
+            meant = nearest(name, known)
+            remedy = "unset it" if meant is None else f"did you mean {prefix}{meant.upper()}?"
+            logger.warning("unknown setting", extra={"variable": variable, "remedy": remedy})
+
+
 def listen(host: str, port: int) -> list[socket.socket]:
     """Sockets listening on every address of a host. Raises WrongSettings if impossible."""
     sockets = list[socket.socket]()
@@ -133,6 +150,7 @@ def serve(settings: Settings) -> None:
     app = create_app(settings)
     connections = Connections(settings)
     log_access(settings)
+    log_unknown_variables(os.environ)
     config = uvicorn.Config(
         app,
         loop="uvloop",

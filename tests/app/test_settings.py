@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
+from joulepath.app.server import log_unknown_variables
 from joulepath.app.settings import Settings, WrongSettings, read_settings
 from joulepath.models.registry import robot_names
 
@@ -24,6 +25,18 @@ def test_an_unknown_robot_stops_the_start_with_the_known_ones(
     monkeypatch.setenv("JOULEPATH_ROBOTS", "ur5e,r2d2")
     with pytest.raises(ValidationError, match=r"'r2d2': use some of .*ur3e, ur5e"):
         Settings()
+
+
+def test_a_variable_that_sets_nothing_is_named(caplog: pytest.LogCaptureFixture) -> None:
+    known = dict.fromkeys(("JOULEPATH_WORKERS", "joulepath_port", "JOULEPATH_CACHE_DIR"), "x")
+    log_unknown_variables(
+        {**known, "JOULEPATH_DATABSE_URL": "x", "JOULEPATH_XYZ": "x", "HOME": "x"}
+    )
+    said = [(vars(each)["variable"], vars(each)["remedy"]) for each in caplog.records]
+    assert said == [
+        ("JOULEPATH_DATABSE_URL", "did you mean JOULEPATH_DATABASE_URL?"),
+        ("JOULEPATH_XYZ", "unset it"),
+    ]
 
 
 def test_every_wrong_variable_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
