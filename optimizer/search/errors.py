@@ -65,7 +65,7 @@ class InCollision(JoulepathError):
         return (
             f"The {self.target} is in collision {each}with a missing clearance of at least "
             f"{math.ceil(self.depth * 1e4) / 1e4:.4f} m "  # never less than what is missing
-            f"({first} and {second}): move the {self.target} or the obstacle."
+            f"({first} and {second}): move the {self.target}, or the obstacle among the two."
         )
 
 
