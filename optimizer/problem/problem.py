@@ -14,6 +14,7 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell
+from joulepath.optimizer.problem.parts import check_parts
 from joulepath.optimizer.problem.scalars import check_choices, check_number
 from joulepath.optimizer.problem.targets import AnyOf, Target, members, validated
 from joulepath.optimizer.problem.tool_path import ToolPath
@@ -89,6 +90,7 @@ class Problem:
     deadline: float = 10.0
 
     def __post_init__(self) -> None:
+        check_parts(self)
         for name in ("start", "goal"):
             end = validated(self.arm, name, getattr(self, name), on_path=self.tool_path is not None)
             object.__setattr__(self, name, end)
