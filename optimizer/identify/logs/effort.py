@@ -61,8 +61,10 @@ def effort_report(motion: LoggedMotion, effort: Array) -> EffortReport:
     carried = gravity.std(axis=0) * effort.any(axis=0)
     heaviest = np.sort(np.argsort(-carried[: (robot.nq + 1) // 2])[:2])
     heaviest = heaviest[carried[heaviest] > 0]
+    # torques behind the gears do not contain the rotors
+    loads = rigid + (robot.torque_side == "motor") * robot.drives.rotor_inertia * part.a
     slopes = {
-        int(j): _slope(rigid[:, j], part.v[:, j], effort[:, j], limit[j])
+        int(j): _slope(loads[:, j], part.v[:, j], effort[:, j], limit[j])
         if carried[j] > EFFORT.min_torque_spread * limit[j]
         else None
         for j in heaviest
@@ -81,15 +83,15 @@ def effort_report(motion: LoggedMotion, effort: Array) -> EffortReport:
     )
 
 
-def _slope(rigid: Array, v: Array, effort: Array, limit: float) -> float | None:
-    """Slope of the effort of one joint against its rigid torque, in a regression with Coulomb and
-    viscous friction and an offset.
+def _slope(load: Array, v: Array, effort: Array, limit: float) -> float | None:
+    """Slope of the effort of one joint against the torque of rigid bodies and rotors, in a
+    regression with Coulomb and viscous friction and an offset.
 
     The slope of a multiple regression is that between the residuals of both quantities against all
     other columns (Frisch, Waugh, Lovell).
     """
     others = np.stack([smooth_sign(v), v, np.ones_like(v)], axis=1)
-    rest, other = (x - others @ np.linalg.lstsq(others, x, rcond=None)[0] for x in (rigid, effort))
+    rest, other = (x - others @ np.linalg.lstsq(others, x, rcond=None)[0] for x in (load, effort))
     if rest.std() < EFFORT.min_torque_spread * limit:
         return None
     return float(rest @ other / (rest @ rest))

@@ -197,6 +197,15 @@ def test_effort_tells_what_it_is(recording: Recording) -> None:
     )
 
 
+def test_rotors_do_not_change_what_the_efforts_are() -> None:
+    # in these short moves, the rotors of joint 2 take 40 % of its slope against the links alone
+    robot = load_robot("ur10e")
+    reading = read_log(csv_of(recorded(robot, truth_of(robot, 4), moves=4, seed=4)), robot)
+    assert reading.report.effort is not None and reading.report.effort.confidence > 0.9
+    slope = reading.report.effort.slope["shoulder_lift_joint"]
+    assert slope == pytest.approx(1 / robot.drives.torque_constant[1], rel=SLOPE)
+
+
 def test_effort_without_gravity_is_not_usable(recording: Recording) -> None:
     rigid = rigid_torques(ROBOT, TRUTH, recording.exact_q, recording.exact_v, recording.a)
     bare = recording.current - rigid / TRUTH.torque_constant
