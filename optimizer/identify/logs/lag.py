@@ -103,9 +103,11 @@ def effort_lag(motion: LoggedMotion, effort: Array) -> float:
 def power_lag(motion: LoggedMotion, power: Array) -> float:
     """Lag of power (n,) behind the motion [s], as `effort_lag`."""
     rows = _compared_rows(len(power), motion.rate)
-    if len(rows) < LAG.min_rows or not np.ptp(power):
-        return 0.0
     part, drives = motion.at(rows), motion.robot.drives
+    # at rest, the noise of the speeds would explain that of the power at some lag
+    moving = (np.abs(part.v) > LAG.min_speed).any(axis=1)
+    if moving.sum() < LAG.min_rows or not np.ptp(power):
+        return 0.0
     rigid = part.rigid_torques()
     torque = rigid + drives.rotor_inertia * part.a
     drag = motion.robot.friction.torque(part.v, rigid)

@@ -70,6 +70,19 @@ def test_efforts_in_time_stay_as_they_are(recording: Recording, lag: float) -> N
     np.testing.assert_allclose(reading.log.effort, late.current, atol=1e-5)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_power_at_rest_has_no_lag(recording: Recording, seed: int) -> None:
+    # the noise of six speeds would explain the noise of the power at some lag
+    random, rows = np.random.default_rng(seed), (1500, ROBOT.nq)
+    time, q = np.arange(rows[0]) / recording.rate, np.tile(recording.q[0], (rows[0], 1))
+    names = ["t", *(f"{part}{k}" for part in "qv" for k in range(1, 7)), "P"]
+    power = 33.0 + random.normal(0, 0.5, rows[0])
+    noise = 1e-6 * random.normal(size=rows), 1e-4 * random.normal(size=rows)
+    reading = read_log(table(names, time, q + noise[0], noise[1], power), ROBOT)
+    assert not any("ms" in each for each in reading.report.warnings)
+    np.testing.assert_allclose(reading.log.power, power, atol=1e-5)
+
+
 def test_times_of_writing_are_not_those_of_the_rows(recording: Recording) -> None:
     random = np.random.default_rng(0)
     written = (
