@@ -223,7 +223,9 @@ def fit_power(
         residuals = measured - predicted
         if iteration:
             weight = bisquare_weights(residuals) if robust else weight
-            noise = effective_variance(measured, residuals, weight, clusters)
+            # a mean residual is the pull of the prior, and no noise
+            mean = float(weight @ residuals / max(weight.sum(), 1e-300))
+            noise = effective_variance(measured, residuals - mean, weight, clusters)
         grouped = GroupedEquations.of(
             slope, residuals + slope @ value, weight / noise, clusters.of_row, clusters.count
         )

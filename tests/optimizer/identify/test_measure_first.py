@@ -84,6 +84,16 @@ def test_the_power_of_the_control_box_is_not_that_of_the_bus() -> None:
     assert not identify(ROBOT, [log]).warnings
 
 
+def test_the_power_of_the_control_box_is_told_from_that_of_the_bus_in_motion() -> None:
+    log = replace(recorded(ROBOT, TRUTH, moves=8).log(), effort=None, effort_meaning=None)
+    assert log.power is not None
+    found = identify(ROBOT, [replace(log, power=log.power + 60.0)], WITHOUT_SPLIT)
+    assert any("control box" in each for each in found.warnings)
+    # the additional power is constant, so that it is no noise of the moves
+    idle = next(each for each in found.parameters if each.figure == "idle_power")
+    assert abs(idle.value - TRUTH.idle_power - 60.0) < 4 * idle.sd < 10
+
+
 def test_a_pose_that_takes_power_to_hold_tells_it_less() -> None:
     sd = []
     for pose in (UPRIGHT_POSE, STRETCHED):
