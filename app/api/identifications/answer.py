@@ -67,8 +67,8 @@ class IdentificationResult:
     warnings: list[str]
     """Warnings of the reading of each log, see `POST /logs`. Then figures at a bound or with a
     large standard deviation, which are used because the logs reject the robot's own values, or know
-    them better. Rejected values mean that the robot's links, torque constants or payload do not fit
-    the logs."""
+    them better. Rejected values mean that the robot's links, torque constants, payload, zeros of
+    positions or side of the torques do not fit the logs."""
     structure: Structure
     """Base parameters of the links and rotors."""
     physical: Physical | None

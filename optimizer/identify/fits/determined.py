@@ -50,7 +50,8 @@ LAW_KEPT = "The joint's Coulomb friction is kept, and so is the rest of its law.
 AT_BOUND = "The fit puts it at its bound, {:g}."
 REJECTED = (
     "{} The robot's own value is {:.0f} standard deviations away, so that it is not kept: check "
-    "the links, the torque constants and the payload."
+    "the payload, the links, the torque constants, zeros and signs of the positions, and the side "
+    "of torques (`torque_side`)."
 )
 
 LESS_KNOWN = (

@@ -22,6 +22,7 @@ from joulepath.optimizer.identify.fits.link_side import (
     seen_behind_gears,
     sensor_of,
     sensor_options,
+    with_doubts_about_side,
 )
 from joulepath.optimizer.identify.fits.periodic import fit_periodic
 from joulepath.optimizer.identify.fits.power_fit import (
@@ -121,7 +122,7 @@ def _with_torque(
     robot: Robot, rows: Rows, torque: Array, fitted: FitResult, options: IdentificationOptions
 ) -> tuple[FitResult, Array]:
     """The fit with torques, and the errors (k, p) of the parameters of its `prior_error_arms`."""
-    own, noise = fitted.arm, None
+    own, own_robot, noise = fitted.arm, robot, None
     if rows.link_side:
         robot, options = seen_behind_gears(robot), sensor_options(rows, torque, options)
     if options.method == "periodic":
@@ -129,6 +130,8 @@ def _with_torque(
     else:
         fit = fit_whole if options.refit else fit_base if options.reduced else fit_torques
         found = fit(robot, rows, torque, fitted.clusters, options)
+    if rows.link_side:
+        found = with_doubts_about_side(found, own_robot)
     of_links = np.array([joint is None or name.startswith(LINK) for name, joint in found.names])
     named = zip(found.names, found.reasons, of_links.tolist(), strict=True)
     terms = {name: reason for name, reason, of_link in named if not of_link}

@@ -30,6 +30,22 @@ BEHIND_GEARS = (
     "The torques were measured behind the gears, where rotors and the friction of motors and gears "
     "do not act: log motor currents, or the power of the arm's bus."
 )
+LIKE_DRIVES = (
+    "It is {:.0%} of the Coulomb friction of motor and gears: the torques seem to be those of the "
+    "motors. Then give `torque_side`."
+)
+
+
+@dataclass(frozen=True)
+class LinkSideSettings:
+    """Settings of the doubts about the place of the measurement."""
+
+    max_bearing_share: float = 0.7
+    """Coulomb friction of the bearings behind a sensor over that of motor and gears, above which
+    the torque was rather measured at the motor [1]; 0.03 to 0.3 on real Pandas."""
+
+
+LINK_SIDE = LinkSideSettings()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,6 +123,16 @@ def sensor_of(nq: int, names: Sequence[Name], value: Array, reversal: int) -> Li
         if name in parts and joint is not None:
             parts[name][joint] = found
     return LinkSensor(**parts, reversal=reversal)
+
+
+def with_doubts_about_side(found: Estimate, robot: Robot) -> Estimate:
+    """The estimate, with remarks on sensors that measure as much friction as drives have."""
+    law, remarks = robot.friction, list(found.remarks or ("",) * len(found.names))
+    for k, (name, joint) in enumerate(found.names):
+        if name == SENSOR_COULOMB and joint is not None:
+            share = float(found.value[k] / max(law.coulomb[joint] + law.curved[joint], 1e-300))
+            remarks[k] = LIKE_DRIVES.format(share) if share > LINK_SIDE.max_bearing_share else ""
+    return replace(found, remarks=tuple(remarks))
 
 
 def kept_drives(robot: Robot, clusters: int, options: IdentificationOptions) -> Estimate:

@@ -73,6 +73,7 @@ def test_torques_behind_the_gears_identify_links_and_keep_the_drives(
 ) -> None:
     real, log = heavier
     found = identify(PANDA, [log], IdentificationOptions())
+    assert not found.warnings
     by_name = {(each.figure, each.joint): each for each in found.parameters}
     for joint in range(PANDA.nq):
         for figure in ("coulomb", "viscous", "rotor_inertia"):
@@ -160,6 +161,13 @@ def test_torques_of_the_same_robots_motors_identify_its_friction() -> None:
     for each in coulomb:
         assert each.joint is not None
         assert each.value == pytest.approx(truth.coulomb[each.joint], rel=0.1)
+
+
+def test_torques_of_motors_are_told_from_those_behind_the_gears() -> None:
+    log = replace(recorded(PANDA, truth_of(PANDA, 1), moves=4).log("torque"), power=None)
+    found = identify(PANDA, [replace(log, torque_side="link")], WITHOUT_SPLIT)
+    told = [each for each in found.warnings if "those of the motors" in each]
+    assert len(told) == PANDA.nq and all("torque_side" in each for each in told)
 
 
 def test_keeping_the_links_or_asking_for_friction_is_refused_with_the_cause(
