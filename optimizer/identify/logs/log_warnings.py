@@ -22,6 +22,8 @@ class WarningSettings:
     saturated [1]."""
     max_saturated_rows: int = 10
     """Number of these rows, above which the effort is saturated."""
+    min_levels: int = 16
+    """Number of values of a moving joint's effort, below which the effort has too few digits."""
     spike_neighbours: int = 5
     """Samples of the median that detects spikes."""
     effort_spike_share: float = 0.8
@@ -94,7 +96,18 @@ def _saturated(log: Log) -> Iterator[str]:
         return
     moving = ~log.rests
     # joint by joint, because a log can fill half of the memory
-    wrong = [joint for joint, effort in enumerate(log.effort.T) if _is_saturated(effort, moving)]
+    levels = [len(np.unique(effort[moving])) for effort in log.effort.T]
+    coarse = [joint for joint, count in enumerate(levels) if 1 < count < WARNINGS.min_levels]
+    if coarse:
+        yield (
+            f"The effort of {named_joints(coarse)} has fewer than {WARNINGS.min_levels} different "
+            "values: its steps hide the friction. Log it with more digits."
+        )
+    wrong = [
+        joint
+        for joint, effort in enumerate(log.effort.T)
+        if joint not in coarse and _is_saturated(effort, moving)
+    ]
     if wrong:
         yield (
             f"The effort of {named_joints(wrong)} stays at its greatest value: it is cut off there."

@@ -279,6 +279,15 @@ def test_constant_saturated_and_misfitting_channels(recording: Recording) -> Non
     assert "speeds of joints 1, 2 do not fit" in words
 
 
+def test_currents_with_few_digits_are_not_taken_as_cut_off(recording: Recording) -> None:
+    current = recording.current.copy()
+    step = float(np.ptp(current[:, 5])) / 8
+    current[:, 5] = np.round(current[:, 5] / step) * step
+    words = " ".join(read_log(csv_of(with_current(recording, current)), ROBOT).report.warnings)
+    assert "The effort of joint 6 has fewer than 16 different values" in words
+    assert "stays at its greatest value" not in words
+
+
 Case = tuple[bytes, str, int | None, str | None]
 
 
