@@ -42,6 +42,13 @@ class RankSettings:
 RANK = RankSettings()
 
 
+class Totals(NamedTuple):
+    """Normal equations of all rows: `gram` (p, p), `moment` (p,)."""
+
+    gram: Array
+    moment: Array
+
+
 @dataclass(frozen=True, eq=False)
 class GroupedEquations:
     """Normal equations of every group of rows: `gram` (G, p, p), `moment` (G, p)."""
@@ -76,6 +83,16 @@ class GroupedEquations:
             gram[k], moment[k] = part.T @ part, part.T @ (root * values[rows])
         return GroupedEquations(gram, moment)
 
+    def total(self, precision: Array | float = 0.0, mean: Array | None = None) -> Totals:
+        """Normal equations of all groups, with a Gaussian prior.
+
+        Args:
+            precision: precision (p, p) of the prior.
+            mean: mean (p,) of the prior; None for 0.
+        """
+        pull = 0.0 if mean is None else precision @ mean
+        return Totals(self.gram.sum(axis=0) + precision, self.moment.sum(axis=0) + pull)
+
 
 def column_lengths(gram: Array, rank: RankSettings = RANK) -> Array:
     """Lengths (p,) of the columns of a normal matrix (p, p); infinite for those that count as zero,
@@ -85,7 +102,9 @@ def column_lengths(gram: Array, rank: RankSettings = RANK) -> Array:
     return np.where(lengths > shortest, lengths, np.inf)
 
 
-def solve_bounded(gram: Array, moment: Array, lower: Array, rank: RankSettings = RANK) -> Array:
+def solve_bounded(
+    gram: Array, moment: Array, lower: Array | float = -np.inf, rank: RankSettings = RANK
+) -> Array:
     """Minimise xᵀ gram x / 2 - momentᵀ x subject to x ≥ lower.
 
     A zero column gets the value 0 if its bound allows it; among dependent columns the shortest
@@ -94,13 +113,13 @@ def solve_bounded(gram: Array, moment: Array, lower: Array, rank: RankSettings =
     Args:
         gram: normal matrix (p, p).
         moment: right-hand side (p,).
-        lower: lower bounds (p,), -inf for none.
+        lower: lower bounds (p,), or one of all; -inf for none.
         rank: tolerances of zero and dependent columns.
 
     Returns:
         The minimiser x (p,).
     """
-    scale = column_lengths(gram, rank)
+    scale, lower = column_lengths(gram, rank), np.broadcast_to(lower, len(moment))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     roots = np.sqrt(np.where(values > rank.eigenvalue_tolerance, values, np.inf))
     target = (vectors / roots).T @ (moment / scale)
@@ -135,7 +154,7 @@ def leave_one_out(
         free: estimated parameters (p,); all others keep the value of `found`.
         prior: precision (p, p) of a Gaussian prior around the estimate's prior mean.
     """
-    total = grouped.gram.sum(axis=0) + (0.0 if prior is None else prior)
+    total = grouped.total(0.0 if prior is None else prior).gram
     estimates = np.tile(found, (len(grouped.gram), 1))
     undetermined = np.zeros(len(found), dtype=bool)
     at = np.flatnonzero(free)
@@ -174,7 +193,7 @@ def residual_replicates(grouped: GroupedEquations, found: Array, free: Mask, pri
         prior: precision (p, p) of the prior.
     """
     at, groups = np.flatnonzero(free), len(grouped.gram)
-    root = np.linalg.inv(np.linalg.cholesky((grouped.gram.sum(axis=0) + prior)[np.ix_(at, at)]))
+    root = np.linalg.inv(np.linalg.cholesky(grouped.total(prior).gram[np.ix_(at, at)]))
     estimates = np.tile(found, (groups, 1))
     # `jackknife` multiplies every square by (G - 1) / G
     wider = np.sqrt(groups / max(groups - 1, 1))

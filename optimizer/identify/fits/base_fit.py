@@ -190,7 +190,7 @@ def _fit(
             GroupedEquations.of(every, arm.values, weight, block.cluster, clusters.count), robot.nq
         )
         grouped = equations.keeping(block.keeps(()))
-        value = solve_bounded(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), lower)
+        value = solve_bounded(*grouped.total(), lower)
         residuals = arm.values - block.kept_torque(()) - columns @ value
         weight = inverse_variance_weights(block.joint, residuals, options.estimator == "irls")
     return _hold_undetermined(terms, block, equations, options, not_moving(block))
@@ -219,7 +219,7 @@ def _hold_undetermined(
     while True:
         grouped = equations.keeping(block.keeps(terms.names_of(~free)))
         part, value = _free_equations(grouped, own, free), own.copy()
-        gram, moment = part.gram.sum(axis=0), part.moment.sum(axis=0)
+        gram, moment = part.total()
         value[free] = solve_bounded(gram, moment, lower[free])
         inside = (value > lower)[free]
         gradient = gram @ value[free] - moment
@@ -234,7 +234,7 @@ def _hold_undetermined(
     replicates = np.tile(value, (len(grouped.gram), 1))
     replicates[:, free] = solution.replicates
     by_prior = by_held_values(
-        grouped.gram.sum(axis=0),
+        grouped.total().gram,
         free & (value > lower),
         held_deviations(block, terms.names, terms.names_of(~free & terms.of_joints)),
     )

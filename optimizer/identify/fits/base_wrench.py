@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from joulepath.models.robot import Array, Robot
+from joulepath.models.robot import Robot
 from joulepath.models.uncertainty.parameters import LINKS
-from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import body_parameters
 from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric
 from joulepath.optimizer.identify.estimates.estimate import Estimate
 from joulepath.optimizer.identify.estimates.grouped import GroupedEquations, leave_one_out
@@ -22,7 +22,7 @@ from joulepath.optimizer.identify.fits.consistent import solve_consistent
 from joulepath.optimizer.identify.fits.determined import with_reasons
 from joulepath.optimizer.identify.fits.whole_fit import LINK
 from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.rows.clusters import Clusters, effective_variance
+from joulepath.optimizer.identify.rows.clusters import Clusters, effective_weights
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 WRENCH_AXES = 6
@@ -57,17 +57,15 @@ def fit_wrench(
     regressor = rows.wrench_regressor - rows.wrench_regressor.mean(axis=0)
     columns = regressor.reshape(-1, len(own))
     values = (rows.wrench - rows.wrench.mean(axis=0)).ravel()
-    cluster = np.repeat(clusters.of_row, WRENCH_AXES)
+    axis = np.tile(np.arange(WRENCH_AXES), len(rows.q))
+    of_axes = Clusters(np.repeat(clusters.of_row, WRENCH_AXES), clusters.count)
     precision = options.prior_weight * distance_metric(own)
     value = own
     for _ in range(WRENCH_FIT.weight_passes):
-        weight = _weights(values, values - columns @ value, clusters)
-        grouped = GroupedEquations.of(columns, values, weight, cluster, clusters.count)
-        gram = grouped.gram.sum(axis=0) + precision
-        moment = grouped.moment.sum(axis=0) + precision @ own
-        value = solve_consistent(
-            gram, moment, len(own) // PARAMETERS_PER_BODY, np.full(len(own), -np.inf)
-        )
+        weight = effective_weights(axis, values, values - columns @ value, of_axes)
+        grouped = GroupedEquations.of(columns, values, weight, of_axes.of_row, clusters.count)
+        gram, moment = grouped.total(precision, own)
+        value = solve_consistent(gram, moment, robot.nq, np.full(len(own), -np.inf))
     root = np.linalg.solve(gram, np.linalg.cholesky(precision))
     found = Estimate(
         names=tuple((LINK + part, joint) for joint in range(robot.nq) for part in LINKS),
@@ -79,14 +77,3 @@ def fit_wrench(
         prior_covariance=root @ root.T,
     )
     return with_reasons(found, range(len(own)))
-
-
-def _weights(measured: Array, residuals: Array, clusters: Clusters) -> Array:
-    """Weights (6 n,) of rows and axes by the inverse of the effective variance of their axis."""
-    values, rest = (each.reshape(-1, WRENCH_AXES).T for each in (measured, residuals))
-    equal = np.ones(len(clusters.of_row))
-    weight = [
-        1 / effective_variance(value, left, equal, clusters)
-        for value, left in zip(values, rest, strict=True)
-    ]
-    return np.tile(weight, len(equal))

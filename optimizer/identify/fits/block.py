@@ -261,7 +261,7 @@ def weighted_solution(
         grouped = GroupedEquations.of(
             block.columns, block.values, weight, block.cluster, clusters.count
         )
-        found = solve_bounded(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), block.lower)
+        found = solve_bounded(*grouped.total(), block.lower)
         if step < passes - 1:
             residuals = block.values - block.columns @ found
             weight = inverse_variance_weights(block.joint, residuals, options.estimator == "irls")

@@ -114,7 +114,7 @@ def unbounded(
         prior: precision (p, p) of a prior.
     """
     lifted, (replicates, undetermined) = value.copy(), leave_one_out(grouped, value, inside, prior)
-    total = grouped.gram.sum(axis=0) + (0.0 if prior is None else prior)
+    total = grouped.total(0.0 if prior is None else prior).gram
     for k in np.flatnonzero(bounded):
         free = inside.copy()
         free[k] = True

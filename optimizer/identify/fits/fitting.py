@@ -106,7 +106,9 @@ def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> FitRes
         mean_power=float(np.mean(moving_power)) if moving_power.size else np.nan,
     )
     if options.method == "base_wrench":
-        return _with_wrench(robot, rows, fitted, options)
+        links = body_parameters(robot.model)
+        found = fit_wrench(robot, rows, clusters, options)
+        return _with_estimate(fitted, found, lambda x: replace(arm, link_change=x - links))[0]
     errors = np.zeros((0, 0))
     if np.isfinite(torque).any() and (options.needs_regressor or terms_of(options)):
         fitted, errors = _with_torque(robot, rows, torque, fitted, options)
@@ -183,18 +185,6 @@ def _link_changes(robot: Robot, options: IdentificationOptions) -> tuple[Array, 
         return np.eye(len(links)), links
     terms = BaseTerms.of(robot, [], options)
     return terms.body_changes(len(links)), terms.own[: len(terms.expressed)]
-
-
-def _with_wrench(
-    robot: Robot, rows: Rows, fitted: FitResult, options: IdentificationOptions
-) -> FitResult:
-    """The fit with links from the wrench beneath the base, and the robot's own other figures."""
-    found, own = fit_wrench(robot, rows, fitted.clusters, options), body_parameters(robot.model)
-
-    def arm(values: Array) -> FittedArm:
-        return replace(fitted.arm, link_change=values - own)
-
-    return _with_estimate(fitted, found, arm)[0]
 
 
 def _with_power(

@@ -109,7 +109,7 @@ def _best_reversal(rows: Rows, torque: Array, options: IdentificationOptions) ->
         count = columns.shape[1] - len(cost)
         for k in range(len(cost)):
             at = [*range(count), count + k]
-            found = solve_bounded(gram[np.ix_(at, at)], moment[at], np.full(count + 1, -np.inf))
+            found = solve_bounded(gram[np.ix_(at, at)], moment[at])
             error = float(np.sum((values - columns[:, at] @ found) ** 2))
             cost[k] += len(values) * np.log(max(error, np.finfo(float).tiny))
     return int(np.argmin(cost))

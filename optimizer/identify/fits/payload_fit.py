@@ -158,8 +158,8 @@ def fit_payload(
     links = PARAMETERS_PER_BODY * robot.nq
     for _ in range(PAYLOAD_FIT.passes):
         grouped, parts = _equations(robot, rows, torque, clusters, log, threshold, body, variance)
-        gram, moment = grouped.gram.sum(axis=0) + prior, grouped.moment.sum(axis=0)
-        value = solve_bounded(gram, moment, np.full(len(prior), -np.inf))
+        gram, moment = grouped.total(prior)
+        value = solve_bounded(gram, moment)
         for joint, (at, left, right, of_row) in enumerate(parts):
             if len(right):
                 error = right - left @ value[at]

@@ -229,8 +229,7 @@ def fit_power(
         grouped = GroupedEquations.of(
             slope, residuals + slope @ value, weight / noise, clusters.of_row, clusters.count
         )
-        precision = grouped.gram.sum(axis=0) + prior.precision
-        target = grouped.moment.sum(axis=0) + prior.precision @ prior.mean
+        precision, target = grouped.total(prior.precision, prior.mean)
         lower = np.linalg.cholesky(precision)
         new = lsq_linear(
             lower.T, np.linalg.solve(lower, target), bounds=(least, np.inf), method="bvls"

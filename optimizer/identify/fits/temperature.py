@@ -115,9 +115,7 @@ def _fit_rate(
         grouped = GroupedEquations.of(
             columns, rest - found[0] * curve, np.ones_like(rest), clusters.of_row, clusters.count
         )
-        step = solve_bounded(
-            grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), np.full(2, -np.inf)
-        )
+        step = solve_bounded(*grouped.total())
         found = found + step
         if np.abs(step).max() < TEMPERATURE.step_tolerance:
             break

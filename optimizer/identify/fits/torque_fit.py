@@ -151,8 +151,8 @@ def _fit_block(
             part.columns, part.values, weight, block.cluster, clusters.count
         )
         inside = value > part.lower
-        gradient = grouped.gram.sum(axis=0) @ value - grouped.moment.sum(axis=0)
-        solution = unbounded(grouped, value, inside, ~inside, gradient)
+        gram, moment = grouped.total()
+        solution = unbounded(grouped, value, inside, ~inside, gram @ value - moment)
         doubts = doubts_of(part, value, solution.sd)
         remarks = remarks_on(part, doubts, solution.value, solution.sd)
         worst = _least_determined(doubts, remarks)
@@ -181,7 +181,7 @@ def _fit_block(
         replicates=all_replicates,
         reasons=tuple(held.get(name, "") for name in block.names),
         prior_covariance=by_held_values(
-            grouped.gram.sum(axis=0), fitted, held_deviations(block, block.names, held)
+            grouped.total().gram, fitted, held_deviations(block, block.names, held)
         ),
         remarks=tuple(remarks.get(name, "") for name in block.names),
     )

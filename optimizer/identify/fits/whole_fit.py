@@ -18,7 +18,7 @@ from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, bod
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED, SENSOR_GAIN
 from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
-from joulepath.optimizer.identify.estimates.grouped import GroupedEquations, bisquare_weights
+from joulepath.optimizer.identify.estimates.grouped import GroupedEquations
 from joulepath.optimizer.identify.fits.block import JointBlock, LawEquations
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
 from joulepath.optimizer.identify.fits.curve_speed import with_curve_speeds
@@ -34,7 +34,7 @@ from joulepath.optimizer.identify.fits.torque_fit import (
 )
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression, whole_arm_regression
 from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.rows.clusters import Clusters, effective_variance
+from joulepath.optimizer.identify.rows.clusters import Clusters, effective_weights
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 LINK = "inertials."
@@ -161,8 +161,7 @@ def _determined(
     lower, (mean, precision) = _lower(block, bodies), _prior(robot, block, options)
     while True:
         grouped = equations.keeping(block.keeps(held))
-        gram = grouped.gram.sum(axis=0) + precision
-        moment = grouped.moment.sum(axis=0) + precision @ mean
+        gram, moment = grouped.total(precision, mean)
         free = _free(block, bodies, held)
         value = _solution_of(gram, moment, mean, free, robot.nq, lower)
         inverse = _inverse(gram, free)
@@ -257,28 +256,21 @@ def _weighted(
     bodies = arm.bodies.shape[1]
     free, lower = _free(block, bodies, held), _lower(block, bodies)
     values = arm.values - block.kept_torque(held)
-    value, weight = mean, _weights(arm, values - arm.torque(mean), clusters, False)
+    of_row = Clusters(block.cluster, clusters.count)
+    weight = effective_weights(block.joint, arm.values, values - arm.torque(mean), of_row)
     columns = (arm.bodies, block.columns, block.unrequested_columns)
     for _ in range(WHOLE_FIT.weight_passes):
         equations = LawEquations(
             GroupedEquations.of(columns, arm.values, weight, block.cluster, clusters.count),
             robot.nq,
         )
-        grouped = equations.keeping(block.keeps(held))
-        gram = grouped.gram.sum(axis=0) + precision
-        moment = grouped.moment.sum(axis=0) + precision @ mean
+        gram, moment = equations.keeping(block.keeps(held)).total(precision, mean)
         value = _solution_of(gram, moment, mean, free, robot.nq, lower)
-        weight = _weights(arm, values - arm.torque(value), clusters, options.estimator == "irls")
+        weight = effective_weights(
+            block.joint,
+            arm.values,
+            values - arm.torque(value),
+            of_row,
+            options.estimator == "irls",
+        )
     return equations
-
-
-def _weights(arm: WholeArmRegression, residuals: Array, clusters: Clusters, robust: bool) -> Array:
-    """Weights (n,) of rows by the inverse of the effective variance of their joint."""
-    weight = np.ones_like(residuals)
-    for joint in np.unique(arm.block.joint):
-        rows = arm.block.joint == joint
-        values, rest, of_row = arm.values[rows], residuals[rows], arm.block.cluster[rows]
-        share = bisquare_weights(rest) if robust else np.ones_like(rest)
-        part = Clusters(of_row, clusters.count)
-        weight[rows] = share / effective_variance(values, rest, share, part)
-    return weight

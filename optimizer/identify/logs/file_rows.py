@@ -200,9 +200,5 @@ class FileRows:
     def _is_header(self, line: str) -> bool:
         """Whether a line repeats the header, as in concatenated files."""
         begin = line[:1].strip("\"'")
-        return (
-            bool(begin) and not begin.isdigit() and begin not in "+-. " and self._same_names(line)
-        )
-
-    def _same_names(self, line: str) -> bool:
-        return names_of(line, self.head.separator)[0] == self.head.names
+        word = bool(begin) and not begin.isdigit() and begin not in "+-. "
+        return word and names_of(line, self.head.separator)[0] == self.head.names

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.identify.estimates.grouped import IntArray
+from joulepath.optimizer.identify.estimates.grouped import IntArray, bisquare_weights
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 
@@ -82,3 +82,24 @@ def effective_variance(
     independent = float(weighted @ weighted / max(weight.sum(), 1e-300))
     least = CLUSTERS.min_relative_sd**2 * float(np.mean(measured**2))
     return max(shared, independent) + least + CLUSTERS.variance_floor
+
+
+def effective_weights(
+    channel: IntArray, measured: Array, residuals: Array, clusters: Clusters, robust: bool = False
+) -> Array:
+    """Weights (n,) of rows by the inverse of the effective variance of their channel.
+
+    Args:
+        channel: channel of a row (n,): its joint, or its axis.
+        measured: measured values (n,).
+        residuals: residuals (n,).
+        clusters: partition of the rows.
+        robust: whether outliers have less weight.
+    """
+    weight = np.ones_like(residuals)
+    for number in np.unique(channel):
+        rows = channel == number
+        share = bisquare_weights(residuals[rows]) if robust else weight[rows]
+        part = Clusters(clusters.of_row[rows], clusters.count)
+        weight[rows] = share / effective_variance(measured[rows], residuals[rows], share, part)
+    return weight
