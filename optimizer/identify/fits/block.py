@@ -275,9 +275,8 @@ def own_value(robot: Robot, name: Name) -> float:
         return 0.0
     if term == SCALE:
         return 1.0
-    if term == "rotor_inertia":
-        return float(robot.drives.rotor_inertia[joint])
-    own = getattr(robot.friction, term, None)
+    of_drive = getattr(robot.drives, term, None)
+    own = getattr(robot.friction, term, None) if of_drive is None else of_drive
     return 0.0 if own is None else float(own[joint])
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.models.uncertainty.parameters import LINKS
 from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
-from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
+from joulepath.optimizer.identify.arm.fitted_arm import FittedArm, own_arm
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.fits.base_fit import BaseTerms
 from joulepath.optimizer.identify.fits.block import own_value
@@ -107,10 +107,8 @@ def _told_rows(
 
 def _own(robot: Robot) -> dict[str, Array]:
     """The robot's own values of figures of joints and of the idle power."""
-    law, drives = robot.friction, robot.drives
-    load = np.zeros(robot.nq) if law.load is None else law.load
-    own = {name: getattr(law, name) for name in LAW} | {"load": load}
-    return own | vars(drives) | {"idle_power": np.array(robot.electronics.idle_power)}
+    law = {name: getattr(own_arm(robot), name) for name in LAW}
+    return law | vars(robot.drives) | {"idle_power": np.array(robot.electronics.idle_power)}
 
 
 def _values(robot: Robot, fitted: FitResult, options: IdentificationOptions) -> dict[str, Array]:
@@ -209,6 +207,4 @@ def _own_value(robot: Robot, name: Name) -> float:
         return 1.0
     if figure == "idle_power":
         return float(robot.electronics.idle_power)
-    if figure in ("copper", "inverter_linear", "torque_constant"):
-        return float(getattr(robot.drives, figure)[joint])
     return own_value(robot, name)
