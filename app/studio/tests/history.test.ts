@@ -1,5 +1,6 @@
 // The back button leads through the pages of the studio, and not out of it.
 import { expect, it, vi } from "vitest";
+import { dialog } from "../src/app/dialog";
 import { followHistory } from "../src/app/history";
 import { edit, page, replaceCell } from "../src/store/state";
 import { MOVE } from "./cells";
@@ -17,8 +18,9 @@ it("the back button leads from the library to the cell", () => {
   followHistory();
   page.value = "library";
   expect(entries).toEqual([{ page: "cell" }, { page: "library" }]);
+  dialog.value = "projects";
   back({ state: entries[0] });
-  expect(page.value).toBe("cell");
+  expect([page.value, dialog.value]).toEqual(["cell", null]);
   expect(entries).toHaveLength(2);
 });
 

@@ -177,6 +177,22 @@ it("the project that was saved last is the first, after a clock was set back", a
   expect((await projects())[0]!.name).toBe("today");
 });
 
+it("a browser without room says that nothing is saved", async () => {
+  const put = vi.spyOn(IDBObjectStore.prototype, "put").mockImplementation(function (
+    this: IDBObjectStore,
+  ) {
+    // Chromium ends the transaction after its requests
+    queueMicrotask(() => this.transaction.abort());
+    return {} as IDBRequest<IDBValidKey>;
+  });
+  replaceCell({ project: { id: "x", name: "big" }, request: MOVE });
+  await saveNow();
+  expect(saved.value).toBe("failed");
+  put.mockRestore();
+  await saveNow();
+  expect(saved.value).toBe("saved");
+});
+
 it("a project has another name, whether it is open or not", async () => {
   replaceCell({ project: { id: "m", name: "closed" }, request: MOVE });
   await saveNow();

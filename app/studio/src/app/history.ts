@@ -1,6 +1,7 @@
 // The browser's back and forward buttons lead through the pages of the studio.
 import { effect } from "@preact/signals";
 import { canUndo, page, request, type Page } from "../store/state";
+import { dialog } from "./dialog";
 
 /** Follows the pages from now on, in the history of the browser. */
 export function followHistory(): void {
@@ -19,6 +20,7 @@ export function followHistory(): void {
       history.replaceState(history.state, "", location.pathname + location.search);
   });
   window.addEventListener("popstate", ({ state }: PopStateEvent) => {
+    dialog.value = null;
     page.value = shown = (state as { page?: Page } | null)?.page ?? "cell";
   });
 }

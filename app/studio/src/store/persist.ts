@@ -36,17 +36,22 @@ function database(): Promise<IDBDatabase> {
   return opened;
 }
 
+/** Waits for the end of a transaction; a browser without room ends it after its requests. */
+const ended = (transaction: IDBTransaction) =>
+  new Promise<void>((resolve, reject) => {
+    transaction.oncomplete = () => resolve();
+    transaction.onabort = () => reject(transaction.error ?? new Error("IndexedDB refused."));
+  });
+
 async function within<T>(
   store: string,
   mode: IDBTransactionMode,
   act: (store: IDBObjectStore) => IDBRequest<T>,
 ): Promise<T> {
-  const open = (await database()).transaction(store, mode).objectStore(store);
-  return new Promise((resolve, reject) => {
-    const asked = act(open);
-    asked.onsuccess = () => resolve(asked.result);
-    asked.onerror = () => reject(asked.error ?? new Error("IndexedDB refused."));
-  });
+  const transaction = (await database()).transaction(store, mode);
+  const asked = act(transaction.objectStore(store));
+  await ended(transaction);
+  return asked.result;
 }
 
 export const newId = () =>
@@ -128,23 +133,19 @@ let known = { id: "", request: "" };
 /** Writes a record, unless another tab has saved another request; in one transaction, for a tab that is closed. */
 async function writeUnlessChanged(record: Saved): Promise<boolean> {
   const before = known;
-  const store = (await database()).transaction("projects", "readwrite").objectStore("projects");
   const own = JSON.stringify(record.request);
-  return new Promise((resolve, reject) => {
-    const asked = store.get(record.id) as IDBRequest<Saved | undefined>;
-    asked.onerror = () => reject(asked.error ?? new Error("IndexedDB refused."));
-    asked.onsuccess = () => {
-      const kept = asked.result && JSON.stringify(asked.result.request);
-      if (kept && before.id === record.id && kept !== before.request && kept !== own)
-        return resolve(false);
-      const put = store.put(record);
-      put.onerror = () => reject(put.error ?? new Error("IndexedDB refused."));
-      put.onsuccess = () => {
-        if (known.id === record.id) known = { id: record.id, request: own };
-        resolve(true);
-      };
-    };
-  });
+  const transaction = (await database()).transaction("projects", "readwrite");
+  const store = transaction.objectStore("projects");
+  const asked = store.get(record.id) as IDBRequest<Saved | undefined>;
+  let written = false;
+  asked.onsuccess = () => {
+    const kept = asked.result && JSON.stringify(asked.result.request);
+    written = !(kept && before.id === record.id && kept !== before.request && kept !== own);
+    if (written) store.put(record);
+  };
+  await ended(transaction);
+  if (written && known.id === record.id) known = { id: record.id, request: own };
+  return written;
 }
 
 /** Writes the present project now; as another project, if both this and another tab have changed it. */
