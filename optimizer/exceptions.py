@@ -335,9 +335,9 @@ class NoTrajectory(_SearchError):
 
 
 class DeadlineExceeded(_SearchError):
-    """The deadline passed before any motion was certified. The wait for a free worker counts."""
+    """The deadline passed before there was an answer. The wait for a free worker counts."""
 
     status = 504
     title = "Deadline exceeded"
     remedy = "Allow a longer `deadline`, or try again when the service is less busy."
-    detail = "The deadline passed before any motion was certified: allow a longer deadline."
+    detail = "The deadline passed before there was an answer: allow a longer deadline."

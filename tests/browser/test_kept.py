@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.models.registry import load_robot
 from tests.app.job_clients import evaluation
-from tests.app.live import CLIENT, Server
+from tests.app.live import ANSWER, CLIENT, Server
 from tests.browser.pages import SHOWN, go, opened, until
 from tests.browsers import BROWSER, MISSING
 from tests.identification_logs import csv_of, recorded, truth_of
@@ -130,7 +130,7 @@ def test_the_time_left_of_an_identification_is_told(browser: Browser, service: S
     log = add_log(service, moves=20)
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
-        body = {"logs": [log], "validate": "moves"}
+        body = {"logs": [log], "validate": "moves", "deadline": ANSWER}
         job = service.post("/identifications", body).json()["id"]
         CLIENT.patch(f"{service.url}/identifications/{job}", json={"name": "Twenty-one fits"})
         page.evaluate(NOTE_PROGRESS)
