@@ -10,7 +10,7 @@ from joulepath.app.api.report.report import Part
 
 _PARTS = {
     "friction": ("Friction in the joints", "#e08e2b"),
-    "idle": ("Electronics, always on", "#8796a5"),
+    "idle": ("Electronics, always on", "#66778a"),
     "dwell": ("Standing and waiting", "#c3cbd3"),
     "copper": ("Copper of the motors", "#8c3b2a"),
     "potential": ("Lifting", "#3b8fc2"),
