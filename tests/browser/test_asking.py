@@ -265,6 +265,8 @@ def test_another_robot_begins_with_a_move_of_its_own(browser: Browser, service: 
         page.locator("#change-robot").click()
         search = page.get_by_role("combobox", name="Search robots")
         expect(search).to_be_focused()
+        # the list begins at the present robot, its last one, below the field
+        expect(search).to_be_in_viewport()
         page.keyboard.type("kuka")
         chosen = page.get_by_role("listbox", name="Robots").locator("[aria-selected=true]")
         expect(chosen).to_contain_text("iiwa")

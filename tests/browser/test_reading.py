@@ -141,9 +141,15 @@ def test_letters_of_twice_the_size(browser: Browser, service: Server, width: int
             expect(page.locator(control)).to_be_in_viewport(ratio=0.9)
 
 
-def test_words_stay_in_the_picture(browser: Browser, service: Server) -> None:
-    """On a phone, the name of the nearest pair is wider than the room beside it."""
-    with opened(browser, f"{service.url}/studio", viewport={"width": 390, "height": 844}) as page:
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (683, 384)])
+def test_words_stay_in_the_picture(
+    browser: Browser, service: Server, width: int, height: int
+) -> None:
+    """On a phone, the name of the nearest pair is wider than the room beside it. At 200 %, it
+    leaves no room for the note on the base frame.
+    """
+    size = {"width": width, "height": height}
+    with opened(browser, f"{service.url}/studio", viewport=size) as page:
         until(page, SHOWN)
         until(page, MESHES)
         # drawn again, after the picture was made anew
@@ -151,3 +157,5 @@ def test_words_stay_in_the_picture(browser: Browser, service: Server) -> None:
         label, box = (page.locator(name).bounding_box() for name in (".label.near", "#labels"))
         assert label and box
         assert box["x"] <= label["x"] and label["x"] + label["width"] <= box["x"] + box["width"]
+        note = page.locator(".frame-note").bounding_box()
+        assert note is None or label["y"] + label["height"] <= note["y"]

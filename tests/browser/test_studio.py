@@ -274,6 +274,12 @@ def test_the_keyboard_is_enough(browser: Browser, service: Server) -> None:
         assert state(page, "request") == FIRST
         page.keyboard.press("Control+Shift+z")
         assert state(page, "stale") is False
+        # an entry that vanishes with its list leaves the focus at the button of the list
+        button = page.locator("#project > summary")
+        button.press("Enter")
+        page.get_by_role("button", name="New cell").press("Enter")
+        until(page, "() => !studio.state.answered")
+        expect(button).to_be_focused()
 
 
 def test_a_point_of_the_front_takes_the_place_of_the_answer(page: Page) -> None:

@@ -16,17 +16,22 @@ interface Props {
 export function Menu({ label, children, name, icon, id, quiet }: Props) {
   const box = useRef<HTMLDetailsElement>(null);
   useEffect(() => {
+    const shut = () => {
+      const { current } = box;
+      // the entry that was chosen vanishes with the list, and the focus would begin at the top
+      if (current?.contains(document.activeElement)) current.querySelector("summary")?.focus();
+      if (current) current.open = false;
+    };
     const away = (event: Event) => {
       const { current } = box;
       const inside = current?.contains(event.target as Node);
       const chosen =
         inside && (event.target as HTMLElement).closest(".drop button:not([data-stays])");
-      if (current?.open && (!inside || chosen)) setTimeout(() => (current.open = false));
+      if (current?.open && (!inside || chosen)) setTimeout(shut);
     };
     const escape = (event: KeyboardEvent) => {
       if (event.key !== "Escape" || !box.current?.open) return;
-      box.current.open = false;
-      box.current.querySelector("summary")?.focus();
+      shut();
       event.stopPropagation();
     };
     const chosenFrom = (event: Event) => {

@@ -17,11 +17,15 @@ export function Table({ head, rows, label }: Props) {
       <table>
         <thead>
           <tr>
-            {head.map((name, k) => (
-              <th key={k} class={isNumber(k) ? "number" : undefined} scope="col">
-                {name}
-              </th>
-            ))}
+            {head.map((name, k) =>
+              name ? (
+                <th key={k} class={isNumber(k) ? "number" : undefined} scope="col">
+                  {name}
+                </th>
+              ) : (
+                <td key={k} />
+              ),
+            )}
           </tr>
         </thead>
         <tbody>
