@@ -44,8 +44,8 @@ define SET_UP
 @+flock Makefile $(MAKE) --no-print-directory $(1)
 endef
 
-.PHONY: serve service test test-long docs bench lock clean ready tools lint mypy style types kernels bytecode pytest \
-	pytest-long vitest
+.PHONY: serve service test test-long docs bench lock clean ready tools lint mypy style types kernels pytest pytest-long \
+	vitest
 
 serve:
 	$(call SET_UP,service)
@@ -61,22 +61,23 @@ tools: $(VENV)/.runtime $(NATIVE)
 	@$(MAKE) --no-print-directory --jobs=3 $(VENV)/.dev $(VENV)/.package kernels $(ROS2)/.ready
 	@$(PY) -m compileall -q app optimizer models
 
-# The linters come first, because they are faster than the tests. mypy takes as long as the other checks together.
+# The linters come first, because they are faster than the tests.
 test: ready
-	@$(MAKE) --no-print-directory --jobs=2 mypy style types vitest bytecode
+	@$(MAKE) --no-print-directory --jobs=2 mypy style types vitest $(VENV)/.bytecode
 	@$(MAKE) --no-print-directory pytest
 
 test-long: ready
-	@$(MAKE) --no-print-directory --jobs=2 mypy style types vitest bytecode
+	@$(MAKE) --no-print-directory --jobs=2 mypy style types vitest $(VENV)/.bytecode
 	@$(MAKE) --no-print-directory pytest-long
 
 # Every process loads all tests, so their bytecode is stored even if PYTHONDONTWRITEBYTECODE is set.
-bytecode pytest pytest-long: export PYTHONDONTWRITEBYTECODE :=
+$(VENV)/.bytecode pytest pytest-long: export PYTHONDONTWRITEBYTECODE :=
 
-# Without this target, every process would compile all tests with their rewritten assertions. Errors of loading are
-# ignored here, because the tests fail later.
-bytecode:
+# Once, for a new environment: without this target, every process would compile all tests with their rewritten
+# assertions, not only those that have changed. Errors of loading are ignored here, because the tests fail later.
+$(VENV)/.bytecode: $(VENV)/.dev
 	@$(PY) -m pytest --collect-only -q -p no:schemathesis > /dev/null || true
+	@touch $@
 
 # `worksteal`: a process without remaining tests takes tests of another process. Only long tests need schemathesis, and
 # loading it takes a second.
@@ -89,8 +90,9 @@ pytest-long:
 
 lint: mypy style types
 
+# Two processes: one alone would take longer than all other checks together.
 mypy: $(VENV)/.dev
-	$(PY) -m mypy
+	$(PY) -m mypy --num-workers 2
 
 style: $(VENV)/.dev
 	$(PY) -m ruff check $(SOURCES)
