@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from joulepath import robot_names
+
 
 def long_but(quick: Collection[Any], values: Iterable[Any]) -> list[Any]:
     """The values, or tuples of values, as parameters of a test, `long` unless in `quick`."""
@@ -17,3 +19,7 @@ def long_but(quick: Collection[Any], values: Iterable[Any]) -> list[Any]:
 
 def _long(each: Any) -> Any:
     return pytest.param(*(each if isinstance(each, tuple) else (each,)), marks=pytest.mark.long)
+
+
+ROBOTS = long_but(["ur5e", "kr10_r1100", "panda"], robot_names())
+"""All robots; every run has one of each form: parallel axes, a spherical wrist, seven joints."""

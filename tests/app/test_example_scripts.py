@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from pathlib import Path
@@ -35,7 +34,7 @@ COMPUTING = {
     "plot_replay": ("{}",),
     "plot_swept_arm": ("examples/optimize/bin_to_shelf.json", "{}"),
 }
-TESTED_ELSEWHERE = {"make_paper_requests", "study_loop"}
+TESTED_ELSEWHERE = {"first_saving", "make_paper_requests", "study_loop"}
 PICTURES = [
     pytest.param(name, marks=pytest.mark.long) if name in SLOW else name
     for name in sorted(ASKING | COMPUTING)
@@ -51,7 +50,7 @@ def run(name: str, *arguments: str) -> str:
 
 def test_every_program_has_a_test() -> None:
     programs = {each.stem for each in EXAMPLES.iterdir() if each.suffix in (".py", ".sh")}
-    assert programs == {*ASKING, *COMPUTING, *TESTED_ELSEWHERE, "first_saving"}
+    assert programs == {*ASKING, *COMPUTING, *TESTED_ELSEWHERE}
 
 
 @pytest.mark.parametrize("name", PICTURES)
@@ -80,11 +79,3 @@ def test_only_programs_without_imports_from_the_repository_are_run_as_files() ->
     assert named
     room = re.compile(r"^from (app|examples|models|optimizer)\b", re.MULTILINE)
     assert [name for name in named if room.search((EXAMPLES / f"{name}.py").read_text())] == []
-
-
-def test_first_saving_prints_what_can_be_saved(server: Server) -> None:
-    asked = "examples/optimize/pick_to_place.json"
-    told = run("first_saving", asked, server.url)
-    answer = server.post("/optimize", json.loads((ROOT / asked).read_text())).json()
-    assert f"{answer['energy']['electrical']['total']:.0f} J in {answer['duration']:.2f} s" in told
-    assert "controller_default" in told and "% saved" in told

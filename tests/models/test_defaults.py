@@ -12,6 +12,7 @@ from joulepath.models.meshes import link_surfaces
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Array, Robot
 from tests.mesh_folders import FOUND, meshes
+from tests.selection import ROBOTS
 
 # relative; the figures have two or three digits
 DIGITS = 0.03
@@ -69,7 +70,7 @@ def test_a_long_link_has_at_least_the_inertia_of_a_rod(name: str) -> None:
         assert body.inertia[2, 2] > body.mass * length**2 / 12
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", ROBOTS)
 def test_every_tensor_is_that_of_a_body(name: str) -> None:
     """Principal moments are positive, and none exceeds the sum of the others, but for rounding and
     one known fault.

@@ -16,10 +16,10 @@ from joulepath.models.capsule_cover import outside
 from joulepath.models.form import link_bodies
 from joulepath.models.meshes import link_surfaces
 from joulepath.models.pictures import KIND, PICTURE, picture, picture_sources
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from tests.mesh_folders import SHIPPED, meshes
-from tests.selection import long_but
+from tests.selection import ROBOTS, long_but
 
 # m; sums of some ten products in double precision
 ROUNDING = 1e-9
@@ -35,7 +35,7 @@ def distance(point: Array, capsule: Array) -> float:
     return float(np.linalg.norm(point - start - share * axis) - capsule[6])
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", ROBOTS)
 def test_housings_meet_on_the_axis_of_each_joint(name: str) -> None:
     robot = load_robot(name)
     bodies = link_bodies(robot.figures)
@@ -50,7 +50,7 @@ def test_housings_meet_on_the_axis_of_each_joint(name: str) -> None:
         assert min(np.linalg.norm(end - middle) for end in ends) == pytest.approx(0, abs=ROUNDING)
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", ROBOTS)
 def test_what_is_drawn_is_where_collision_checks_see_the_arm(name: str) -> None:
     robot = load_robot(name)
     names = ["base", *robot.figures["kinematics"]["link_names"]["value"]]

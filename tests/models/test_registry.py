@@ -22,6 +22,7 @@ from joulepath.models.urdf import urdf_of
 from tests.by_pinocchio import flange
 from tests.mesh_folders import SHIPPED
 from tests.mesh_folders import meshes as arm_folder
+from tests.selection import ROBOTS
 
 # double precision over a product of seven matrices of entries about 1
 ROUNDING = 1e-14
@@ -57,7 +58,7 @@ MASSES = {
 }
 
 
-@pytest.fixture(params=robot_names())
+@pytest.fixture(params=ROBOTS)
 def robot(request: pytest.FixtureRequest) -> Robot:
     return load_robot(request.param)
 
@@ -137,7 +138,7 @@ def test_names_load_and_others_do_not() -> None:
         load_robot("../ur5e")
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", ROBOTS)
 def test_every_figure_has_unit_source_and_trust(name: str) -> None:
     found = dict(leaves(load_figures(name)))
     assert len(found) > 30
@@ -147,7 +148,7 @@ def test_every_figure_has_unit_source_and_trust(name: str) -> None:
         assert all(figure[part] for part in ("unit", "source", "note")), name
 
 
-@pytest.mark.parametrize("robot_name", robot_names())
+@pytest.mark.parametrize("robot_name", ROBOTS)
 def test_no_figure_without_source_is_trusted(robot_name: str) -> None:
     for name, figure in leaves(load_figures(robot_name)):
         assert figure["source"].startswith("none") == (figure["trust"] == "E"), name

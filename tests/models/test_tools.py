@@ -20,13 +20,13 @@ from joulepath import (
     UnknownTool,
     load_robot,
     load_tool,
-    robot_names,
     tool_names,
 )
 from joulepath.models.tools.registry import FIGURES, HULL_FIGURES, tool_figures
 from joulepath.models.trust import TRUST
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.problem.arm import TOOL
+from tests.selection import ROBOTS
 
 # of sums of a few numbers in double precision
 ROUNDING = 1e-12
@@ -71,7 +71,7 @@ def test_the_mass_lies_within_the_shape_and_the_tcp_at_its_tip(name: str) -> Non
 
 
 @pytest.mark.parametrize("name", tool_names())
-@pytest.mark.parametrize("robot", robot_names())
+@pytest.mark.parametrize("robot", ROBOTS)
 def test_a_tool_leaves_the_arm_room_to_move(name: str, robot: str) -> None:
     arm = Arm(robot=load_robot(robot), tool=load_tool(name).shape)
     limits = arm.robot.limits

@@ -124,7 +124,7 @@ def test_an_iteration_keeps_its_request_and_its_whole_answer(
 
 def test_the_studys_objective_is_the_iterations(client: TestClient) -> None:
     path = begin(client, objective="mechanical")
-    step = added(client, path, {"optimize": move(duration=2.0)})
+    step = added(client, path, {"optimize": move(duration=2.0, method="time_scaling")})
     assert step["request"]["optimize"]["objective"] == "mechanical"
     assert step["energy"] == step["mechanical"] < step["electrical"]
     answer = client.post(

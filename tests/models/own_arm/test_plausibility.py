@@ -12,9 +12,10 @@ from joulepath.models.own_arm.description import Description, InvalidArm
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.holding_torques import HoldingTorques
 from joulepath.models.own_arm.urdf_chain import chain_of
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import load_robot
 from joulepath.models.urdf import urdf_of
 from tests.models.own_arm.arms import PLAIN, RICH, RICH_ARM, robot
+from tests.selection import ROBOTS
 
 CAUSES = (
     "is implausible",
@@ -52,7 +53,7 @@ def changed(old: str, new: str) -> Description:
 IDENTIFIED_INERTIAS = {"panda": ("link1", "link5")}
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", ROBOTS)
 def test_a_known_arm_is_plausible(name: str) -> None:
     known = load_robot(name)
     description = Description(

@@ -117,6 +117,7 @@ def test_the_bound_tells_far_from_near() -> None:
     assert far > near + 30
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("most", "alone", "rounds", "rounds_at_goal"),
     long_but(

@@ -11,10 +11,11 @@ import pytest
 from joulepath.models.own_arm.description import Description
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.robots import own_robot
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule, Robot
 from joulepath.optimizer.collision.example_move import EXAMPLE, example_move
 from tests.by_pinocchio import flange
+from tests.selection import ROBOTS
 
 ROUNDING = 1e-9
 """Of a direction and a position limit: double precision, over eight turns."""
@@ -60,7 +61,7 @@ def jacobian(robot: Robot, q: Array) -> Array:
     return J
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", ROBOTS)
 def test_each_robot_begins_at_ease(name: str) -> None:
     robot = load_robot(name)
     move = example_move(robot)

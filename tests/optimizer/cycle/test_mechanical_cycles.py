@@ -65,6 +65,7 @@ def test_the_cycle_is_true(time: float, method: MethodName) -> None:
             assert each.saving >= -CONVERGED
 
 
+@pytest.mark.long
 def test_a_single_move_uses_all_of_the_time() -> None:
     """It does no more work than the same motion by itself."""
     goal = HOME + np.array([1.0, 0.3, 0.0, 0.0, 0.0, 0.0])

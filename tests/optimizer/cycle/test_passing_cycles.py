@@ -78,6 +78,7 @@ def against(found: CycleSolution) -> dict[str, float]:
     return {each.name: 1 - own / each.electrical for each in found.baselines}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", long_but([0], range(6)))
 def test_passing_is_never_worse_than_the_best_cycle_that_stops(seed: int) -> None:
     asked = passing_cycle(seed, 3)

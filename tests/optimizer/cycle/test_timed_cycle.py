@@ -111,6 +111,7 @@ def test_it_is_not_dearer_than_simple_ways_to_share_the_time(factor: float) -> N
             assert names[name].saving >= -CONVERGED
 
 
+@pytest.mark.long
 def test_no_other_way_to_share_the_time_is_cheaper() -> None:
     """No other allocation of the time to the moves of the chain needs less energy.
 

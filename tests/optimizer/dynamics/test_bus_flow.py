@@ -198,7 +198,8 @@ def test_buses_make_a_difference() -> None:
     assert total("down", STORE) < 0.97 * total("down", Bus())
 
 
-@pytest.mark.parametrize("name", ["down", pytest.param("swing", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["down", "swing"])
 def test_a_store_lies_between_none_and_all(name: str) -> None:
     """Without capacity it is the shared bus; without a limit it is recuperation at its
     efficiency."""

@@ -118,7 +118,7 @@ def test_no_duration_is_better(name: str) -> None:
     )
     assert energy.parts_sum == pytest.approx(energy.total, rel=1e-4)
     scan = {}
-    for T in [*np.linspace(0.85, dwell.time, 5), found.duration]:
+    for T in [*np.linspace(0.85, dwell.time, 3), found.duration]:
         alone = solved(None, float(T)).energy.electrical.total
         scan[T] = alone + dwell_energy(dwell, problem(START, GOAL).arm, hold(), float(T))
     assert energy.total <= min(scan.values()) * (1 + SCAN)

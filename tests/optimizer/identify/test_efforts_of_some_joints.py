@@ -18,6 +18,7 @@ from joulepath.optimizer.identify.logs.recorded import measured
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.problem.arm import Arm, Payload
 from tests.identification_logs import FAR, WITHOUT_SPLIT, csv_of, recorded, truth_of, with_current
+from tests.selection import long_but
 
 ROBOT = load_robot("ur10e")
 TRUTH = truth_of(ROBOT)
@@ -85,7 +86,10 @@ def by_map() -> LogReading:
     return read_log(body_of([head, *rows[1:]]), ROBOT, options)
 
 
-@pytest.mark.parametrize("reader", [by_number, by_empty_cells, by_constants, by_name, by_map])
+@pytest.mark.parametrize(
+    "reader",
+    long_but([by_empty_cells, by_map], [by_number, by_empty_cells, by_constants, by_name, by_map]),
+)
 def test_the_friction_of_one_joint_is_told_by_its_effort(reader: object) -> None:
     reading = reader()  # type: ignore[operator]
     log: Log = reading.log

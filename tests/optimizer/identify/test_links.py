@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.document import covariance_of
 from joulepath.models.uncertainty.parameters import LINKS
@@ -24,6 +24,7 @@ from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.options import IdentificationOptions
 from tests.identification_logs import recorded, torque_errors, truth_of
 from tests.impossible_links import with_impossible_link
+from tests.selection import ROBOTS
 
 ROUNDING = 1e-9
 # Gautier and Khalil's numbers for arms of these forms, without rotors and with rotors
@@ -67,7 +68,7 @@ def test_real_bodies_have_positive_pseudo_inertias_and_no_others() -> None:
     assert np.linalg.eigvalsh(pseudo_inertias(wrong.toDynamicParameters()))[0, 0] < 0
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", ROBOTS)
 def test_nearness_is_a_distance_for_every_robot(name: str) -> None:
     """Also for parameters of no real body, such as published ones of a link of the Panda."""
     metric = distance_metric(body_parameters(load_robot(name).model))

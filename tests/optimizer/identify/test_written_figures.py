@@ -219,20 +219,19 @@ def test_what_power_hardly_determines_keeps_its_letter_and_says_so() -> None:
 TERMS: tuple[tuple[Term, ...], ...] = (
     ("coulomb",),
     ("coulomb", "viscous"),
-    ("viscous", "offset"),
     ("coulomb", "curved"),
     DEFAULT_TERMS,
-    CURVED,
 )
 WITHOUT_POWER, POWER_ALONE = {"power": None}, {"effort": None, "effort_meaning": None}
 CASES: list[tuple[dict[str, Any], dict[str, Any]]] = [
-    *(({"terms": terms}, WITHOUT_POWER) for terms in TERMS),
+    *(({"terms": terms}, WITHOUT_POWER) for terms in (("viscous", "offset"), CURVED)),
     ({}, POWER_ALONE),
-    ({"fit": ("friction",)}, {}),
-    ({"method": "threshold_velocity"}, {}),
     ({"refit": True, "terms": CURVED}, {}),
 ]
 LONG_CASES: list[tuple[dict[str, Any], dict[str, Any]]] = [
+    *(({"terms": terms}, WITHOUT_POWER) for terms in TERMS),
+    ({"fit": ("friction",)}, {}),
+    ({"method": "threshold_velocity"}, {}),
     ({"fit": ("rotor",)}, {}),
     ({"fit": ("friction", "rotor", "torque_constant"), "terms": CURVED}, {}),
     ({"knee": 0.02}, {}),

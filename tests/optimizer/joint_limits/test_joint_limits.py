@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -103,6 +104,13 @@ def test_full_speed_is_refused_with_a_posture() -> None:
     assert (found > allowed).any(axis=1).all()
 
 
+@cache
+def limits_of_ur5e() -> tuple[Arm, JointLimits]:
+    """A loaded arm and its joint limits, for several tests."""
+    arm = loaded("ur5e", com=(0, 0, 0.1))
+    return arm, joint_limits(arm)
+
+
 def attacked(arm: Arm, found: JointLimits) -> float:
     limits = arm.active_limits
     return worst_ratio(arm, Rates(found.v, found.a), limits.q_min, limits.q_max)
@@ -110,8 +118,7 @@ def attacked(arm: Arm, found: JointLimits) -> float:
 
 def test_no_attack_exceeds_a_torque_limit() -> None:
     """One attack comes close to a limit, so the joint limits are not needlessly low."""
-    arm = loaded("ur5e", com=(0, 0, 0.1))
-    found = joint_limits(arm)
+    arm, found = limits_of_ur5e()
     assert 0.9 < attacked(arm, found) <= 1
     most = arm.active_limits
     assert (found.v <= most.v_max).all() and (found.a <= most.a_max).all()
@@ -136,11 +143,10 @@ def test_a_payload_that_gravity_makes_too_heavy(name: str) -> None:
 
 
 def test_the_postures_of_a_motion_hold_more() -> None:
-    arm = loaded("ur5e", com=(0, 0, 0.1))
+    arm, anywhere = limits_of_ur5e()
     start, goal = np.array([0, -1.6, 1.6, -1.6, -1.6, 0]), np.array([1, -1.2, 1.2, -1.6, -1.2, 0.5])
     spline = spline_through(np.array([0.0, 1.5]), np.stack([start, goal]), REST, REST)
     here = joint_limits_along([(spline, arm)])
-    anywhere = joint_limits(arm)
     assert (here.v >= anywhere.v).all() and here.a[1] > 1.5 * anywhere.a[1]
     rates = Rates(here.v, here.a)
     path = sample(spline, np.linspace(0, 1.5, 40))[0]

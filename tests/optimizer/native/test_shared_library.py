@@ -13,12 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
 from joulepath.optimizer.native import build
 from joulepath.optimizer.native.build import FOLDER, LIBRARY, BuildFailed, sources_digest
 from joulepath.optimizer.native.shared_library import LibraryUnusable, load
+from tests.selection import ROBOTS
 
 pytestmark = pytest.mark.usefixtures("compiler")
 FRAMES = 1e-14  # m and cosines; both round, and numpy's sine differs in the last digit
@@ -148,7 +149,7 @@ def frames_by_numpy(placements: Array, q: Array) -> Array:
     return frames
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", ROBOTS)
 def test_frames_are_those_of_numpy(name: str) -> None:
     """Also for zero configurations, for some joints alone, and for non-contiguous arrays."""
     robot = load_robot(name)

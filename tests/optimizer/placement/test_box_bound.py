@@ -66,7 +66,7 @@ def robots() -> dict[str, Robot]:
 
 @pytest.mark.parametrize("base", [np.eye(4), TILTED], ids=["upright", "tilted"])
 @pytest.mark.parametrize("region", REGIONS)
-@pytest.mark.parametrize("robot", ["ur5e", "drawn"])
+@pytest.mark.parametrize("robot", long_but(["drawn"], ["ur5e", "drawn"]))
 def test_every_configuration_is_in_a_box(robot: str, region: str, base: np.ndarray) -> None:
     """Every configuration is in a box, and its travel is covered.
 

@@ -76,6 +76,7 @@ def test_what_is_in_the_world_stays_there() -> None:
     assert np.array_equal(rest.target, rich()[3].target)  # type: ignore[arg-type]
 
 
+@pytest.mark.long
 def test_a_world_that_turns_about_the_vertical_costs_the_same() -> None:
     """A common turn of base, stops and obstacles about the vertical leaves the energy unchanged."""
     cycle = two_stops([floor()])

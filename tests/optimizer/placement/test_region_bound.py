@@ -23,7 +23,6 @@ from joulepath import (
     WeightedCycle,
     load_robot,
     plan_cycle,
-    robot_names,
 )
 from joulepath.optimizer.kinematics.tcp import tcp_jacobian
 from joulepath.optimizer.placement.extents import Extents
@@ -31,7 +30,7 @@ from joulepath.optimizer.placement.placement import Placement
 from joulepath.optimizer.placement.region_bound import levers, prices_of_travel, region_bound
 from joulepath.optimizer.placement.space import Place, Space
 from tests.optimizer.placement.cells import PART, arm, at, down, two_stops
-from tests.selection import long_but
+from tests.selection import ROBOTS, long_but
 
 ROUNDING = 1e-9
 G = 9.81
@@ -66,7 +65,7 @@ def test_boxes_contain_their_points_at_all_places() -> None:
             assert (box.low <= point + ROUNDING).all() and (point <= box.high + ROUNDING).all()
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", ROBOTS)
 def test_no_joint_moves_the_tool_by_more_than_its_lever(name: str) -> None:
     robot = load_robot(name)
     tool = at(0.03, -0.05, 0.2)

@@ -15,13 +15,12 @@ from joulepath import (
     Sphere,
     capsule_between,
     load_robot,
-    robot_names,
 )
 from joulepath.optimizer.collision.bodies import bodies_of
 from joulepath.optimizer.problem.names import LONGEST_NAME, first_repeated, is_plain, normalized
 from tests.optimizer.chains import serial_chain
 
-ROBOTS: list[Robot] = [*map(load_robot, robot_names()), serial_chain(4)]
+ROBOTS: list[Robot] = [*map(load_robot, ("ur5e", "kr10_r1100", "panda")), serial_chain(4)]
 
 
 def scene(*names: str) -> Scene:

@@ -43,6 +43,7 @@ from tests.impossible_links import with_impossible_link
 from tests.models.own_arm.arms import RICH_ARM
 from tests.models.own_arm.arms import robot as own_arm
 from tests.optimizer.moves import PAYLOAD, START, TILTED
+from tests.selection import ROBOTS
 
 # two recursions over the same figures: rounding
 ROUNDING = 1e-9
@@ -85,7 +86,7 @@ def tcp_position(simulated: SimulatedArm, q: Array) -> Array:
     return np.array(simulated.data.site_xpos[0])
 
 
-@pytest.mark.parametrize("name", [*robot_names(), "own"])
+@pytest.mark.parametrize("name", [*ROBOTS, "own"])
 def test_dynamics_and_poses_are_those_of_pinocchio(name: str) -> None:
     arm = loaded(own_arm(RICH_ARM) if name == "own" else load_robot(name))
     simulated, (q, v, a) = SimulatedArm(arm), states(arm.robot)
