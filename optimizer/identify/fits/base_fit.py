@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from joulepath.models.robot import Array, Mask, Robot
-from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import body_parameters
 from joulepath.optimizer.identify.arm.base_parameters import BaseParameters, base_parameters
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED, lower_bounds
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
@@ -22,7 +22,13 @@ from joulepath.optimizer.identify.estimates.grouped import (
     inverse_variance_weights,
     solve_bounded,
 )
-from joulepath.optimizer.identify.fits.block import PASSES, JointBlock, LawEquations, own_value
+from joulepath.optimizer.identify.fits.block import (
+    PASSES,
+    JointBlock,
+    LawEquations,
+    TorqueData,
+    own_value,
+)
 from joulepath.optimizer.identify.fits.curve_speed import with_curve_speeds
 from joulepath.optimizer.identify.fits.determined import (
     DETERMINED,
@@ -41,8 +47,6 @@ from joulepath.optimizer.identify.fits.torque_fit import (
 )
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression, whole_arm_regression
 from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.rows.clusters import Clusters
-from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 ROTOR = "rotor_inertia"
 
@@ -152,42 +156,26 @@ class BaseTerms:
         return np.asarray(np.linalg.pinv(self.base.combination[list(self.expressed), :body_count]))
 
 
-def fit_base(
-    robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
-) -> Estimate:
+def fit_base(data: TorqueData) -> Estimate:
     """Fit base parameters and friction by ordinary, weighted or reweighted least squares.
 
     Undetermined friction and rotors are held at the robot's own values, the least determined first,
     until all others are determined; with the method `essential_parameters`, undetermined base
     parameters, too. An unknown is not held if the logs reject its own value, or know it better.
-
-    Args:
-        robot: the robot with its own figures.
-        rows: rows with regressors.
-        torque: motor torques (n, nq) [N·m], NaN if not logged.
-        clusters: partition of the rows for the jackknife.
-        options: requested figures and estimator.
     """
-    given = robot, rows, torque, clusters, options
-    return with_curve_speeds(lambda speeds: _fit(*given, speeds), *given)
+    return with_curve_speeds(lambda speeds: _fit(data, speeds), data)
 
 
-def _fit(
-    robot: Robot,
-    rows: Rows,
-    torque: Array,
-    clusters: Clusters,
-    options: IdentificationOptions,
-    speeds: Array | None,
-) -> Estimate:
+def _fit(data: TorqueData, speeds: Array | None) -> Estimate:
     """The fit of `fit_base`, for given speeds (nq,) of the curved terms."""
-    arm = base_regression(robot, rows, torque, clusters, options, speeds)
-    terms = base_terms(robot, arm, options)
+    options, arm = data.options, base_regression(data, speeds)
+    terms = base_terms(data.robot, arm, options)
     columns, lower, block = terms.columns(arm), terms.lower, arm.block
     weight, every = np.ones_like(arm.values), (columns, block.unrequested_columns)
     for _ in range(PASSES.of(options.estimator, PASSES.wls_of_arm)):
         equations = LawEquations(
-            GroupedEquations.of(every, arm.values, weight, block.cluster, clusters.count), robot.nq
+            GroupedEquations.of(every, arm.values, weight, block.cluster, data.clusters.count),
+            data.robot.nq,
         )
         grouped = equations.keeping(block.keeps(()))
         value = solve_bounded(*grouped.total(), lower)
@@ -242,26 +230,11 @@ def _hold_undetermined(
     return with_reasons(found, range(len(terms.expressed)))
 
 
-def base_regression(
-    robot: Robot,
-    rows: Rows,
-    torque: Array,
-    clusters: Clusters,
-    options: IdentificationOptions,
-    speeds: Array | None,
-) -> WholeArmRegression:
-    """Regression of motor torques (n, nq) [N·m] on all bodies, friction and rotors."""
-    assert rows.regressor is not None
-    return whole_arm_regression(
-        robot,
-        rows,
-        torque,
-        clusters,
-        options,
-        rows.regressor,
-        np.zeros(PARAMETERS_PER_BODY * robot.nq),
-        speeds,
-    )
+def base_regression(data: TorqueData, speeds: Array | None) -> WholeArmRegression:
+    """Regression of the torques on all bodies, friction and rotors."""
+    bodies = data.rows.regressor
+    assert bodies is not None
+    return whole_arm_regression(data, bodies, np.zeros(bodies.shape[2]), speeds)
 
 
 def base_terms(robot: Robot, arm: WholeArmRegression, options: IdentificationOptions) -> BaseTerms:

@@ -52,6 +52,22 @@ SCALE = "scale"
 
 
 @dataclass(frozen=True, eq=False)
+class TorqueData:
+    """Data of a fit to torques."""
+
+    robot: Robot
+    """The robot with its own figures."""
+    rows: Rows
+    """Rows of the logs; with regressors for a fit of links."""
+    torque: Array
+    """Torques (n, nq) [N·m], of the motors or behind the gears; NaN if not logged."""
+    clusters: Clusters
+    """Partition of the rows for the jackknife."""
+    options: IdentificationOptions
+    """Requested figures and estimator."""
+
+
+@dataclass(frozen=True, eq=False)
 class JointBlock:
     """Linear regression of the torques of some joints, with n rows and p terms."""
 
@@ -122,26 +138,15 @@ def terms_of(options: IdentificationOptions) -> list[str]:
     return [*friction, *(("rotor_inertia",) if "rotor" in options.targets else ()), *scale]
 
 
-def joint_block(
-    robot: Robot,
-    rows: Rows,
-    torque: Array,
-    clusters: Clusters,
-    options: IdentificationOptions,
-    joints: Sequence[int],
-    speed: Array | None = None,
-) -> JointBlock:
+def joint_block(data: TorqueData, joints: Sequence[int], speed: Array | None = None) -> JointBlock:
     """Regression of some joints.
 
     Args:
-        robot: the robot with its own figures.
-        rows: rows of the logs.
-        torque: motor torques (n, nq) [N·m], NaN if not logged.
-        clusters: partition of the rows.
-        options: requested figures.
+        data: data of the fit.
         joints: numbers of the joints.
         speed: speeds (nq,) of the curved terms [rad/s]; None for the robot's own.
     """
+    robot, rows, torque, options = data.robot, data.rows, data.torque, data.options
     terms, knee = terms_of(options), robot.friction.knee if options.knee is None else options.knee
     couplings = [
         (k, each) for k, each in enumerate(options.couplings) if set(each.joints) <= set(joints)
@@ -166,7 +171,9 @@ def joint_block(
             v, a, rigid, joint, coupled, [each for _, each in couplings], knee
         )
         rest = _unrequested_law(robot, terms, knee).torque(v, rigid)[:, joint]
-        parts.append((columns, (torque - known)[use, joint], joint, clusters.of_row[use], rest))
+        parts.append(
+            (columns, (torque - known)[use, joint], joint, data.clusters.of_row[use], rest)
+        )
     return JointBlock(
         names=tuple(names),
         columns=np.concatenate([part[0] for part in parts]),
@@ -250,16 +257,15 @@ def moving_rows(
     return use
 
 
-def weighted_solution(
-    block: JointBlock, clusters: Clusters, options: IdentificationOptions
-) -> tuple[Array, Array]:
+def weighted_solution(block: JointBlock, data: TorqueData) -> tuple[Array, Array]:
     """Solution (p,) and weights (n,) of the rows."""
+    options = data.options
     weight = np.ones_like(block.values)
     one_joint = len(np.unique(block.joint)) <= 1
     passes = PASSES.of(options.estimator, 1 if one_joint else PASSES.wls_of_block)
     for step in range(passes):
         grouped = GroupedEquations.of(
-            block.columns, block.values, weight, block.cluster, clusters.count
+            block.columns, block.values, weight, block.cluster, data.clusters.count
         )
         found = solve_bounded(*grouped.total(), block.lower)
         if step < passes - 1:

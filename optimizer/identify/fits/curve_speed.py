@@ -11,12 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from joulepath.models.robot import Array, Robot
+from joulepath.models.robot import Array
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join_estimates
-from joulepath.optimizer.identify.fits.block import JointBlock, joint_block, weighted_solution
-from joulepath.optimizer.identify.options import Coupling, IdentificationOptions
-from joulepath.optimizer.identify.rows.clusters import Clusters
-from joulepath.optimizer.identify.rows.fit_rows import Rows
+from joulepath.optimizer.identify.fits.block import (
+    JointBlock,
+    TorqueData,
+    joint_block,
+    weighted_solution,
+)
+from joulepath.optimizer.identify.options import Coupling
 
 
 @dataclass(frozen=True)
@@ -34,23 +37,16 @@ class CurveSpeedSettings:
 CURVE_SPEED = CurveSpeedSettings()
 
 
-def _best_speeds(
-    robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
-) -> Array | None:
+def _best_speeds(data: TorqueData) -> Array | None:
     """Best speeds (nq,) [rad/s] of the curved terms; None if these are not fitted."""
+    robot, options = data.robot, data.options
     if "curved" not in options.terms or "friction" not in options.targets:
         return None
     found = np.array(robot.friction.speed)
     candidates = np.geomspace(CURVE_SPEED.smallest, CURVE_SPEED.largest, CURVE_SPEED.count)
     for joints in coupled_joints(robot.nq, options.couplings):
         errors = [
-            _squared_error(
-                joint_block(
-                    robot, rows, torque, clusters, options, joints, np.full(robot.nq, speed)
-                ),
-                clusters,
-                options,
-            )
+            _squared_error(joint_block(data, joints, np.full(robot.nq, speed)), data)
             for speed in candidates.tolist()
         ]
         if max(errors) > min(errors):
@@ -58,8 +54,8 @@ def _best_speeds(
     return found
 
 
-def _squared_error(block: JointBlock, clusters: Clusters, options: IdentificationOptions) -> float:
-    found, _ = weighted_solution(block, clusters, options)
+def _squared_error(block: JointBlock, data: TorqueData) -> float:
+    found, _ = weighted_solution(block, data)
     residuals = block.values - block.columns @ found
     return float(residuals @ residuals)
 
@@ -73,27 +69,16 @@ def coupled_joints(nq: int, couplings: Sequence[Coupling]) -> list[list[int]]:
     return [np.flatnonzero(labels == label).tolist() for label in np.unique(labels)]
 
 
-def with_curve_speeds(
-    fit: Callable[[Array | None], Estimate],
-    robot: Robot,
-    rows: Rows,
-    torque: Array,
-    clusters: Clusters,
-    options: IdentificationOptions,
-) -> Estimate:
+def with_curve_speeds(fit: Callable[[Array | None], Estimate], data: TorqueData) -> Estimate:
     """Fit with the best speeds of the curved terms as further figures.
 
     A curved term kept at the robot's own value also keeps the robot's own speed scale.
 
     Args:
         fit: fit for given speeds (nq,) [rad/s]; for None if the curved terms are not fitted.
-        robot: the robot with its own figures.
-        rows: rows of the logs.
-        torque: torques (n, nq) [N·m], NaN if not logged.
-        clusters: partition of the rows.
-        options: requested figures; coupled joints share a speed.
+        data: data of the fit; coupled joints share a speed.
     """
-    speeds = _best_speeds(robot, rows, torque, clusters, options)
+    speeds = _best_speeds(data)
     while True:
         found = fit(speeds)
         if speeds is None:
@@ -103,7 +88,7 @@ def with_curve_speeds(
             for (name, joint), reason in zip(found.names, found.reasons, strict=True)
             if name == "curved" and joint is not None
         ]
-        own = robot.friction.speed
+        own = data.robot.friction.speed
         kept = [joint for joint, is_kept in curved if is_kept and speeds[joint] != own[joint]]
         if not kept:
             joints = [joint for joint, is_kept in curved if not is_kept]

@@ -15,7 +15,7 @@ from joulepath.optimizer.identify.arm.power_model import PowerParameters, packed
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join_estimates
 from joulepath.optimizer.identify.fits.base_fit import BaseTerms, fit_base
 from joulepath.optimizer.identify.fits.base_wrench import fit_wrench
-from joulepath.optimizer.identify.fits.block import terms_of
+from joulepath.optimizer.identify.fits.block import TorqueData, terms_of
 from joulepath.optimizer.identify.fits.determined import DETERMINED, with_reasons
 from joulepath.optimizer.identify.fits.link_side import (
     kept_drives,
@@ -127,11 +127,12 @@ def _with_torque(
     own, own_robot, noise = fitted.arm, robot, None
     if rows.link_side:
         robot, options = seen_behind_gears(robot), sensor_options(rows, torque, options)
+    data = TorqueData(robot, rows, torque, fitted.clusters, options)
     if options.method == "periodic":
-        found, noise = fit_periodic(robot, rows, torque, fitted.clusters, options)
+        found, noise = fit_periodic(data)
     else:
         fit = fit_whole if options.refit else fit_base if options.reduced else fit_torques
-        found = fit(robot, rows, torque, fitted.clusters, options)
+        found = fit(data)
     if rows.link_side:
         found = with_doubts_about_side(found, own_robot)
     of_links = np.array([joint is None or name.startswith(LINK) for name, joint in found.names])

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joulepath.models.robot import Array, Robot
+from joulepath.models.robot import Array
 from joulepath.optimizer.identify.errors import MethodNotApplicable
 from joulepath.optimizer.identify.estimates.estimate import Estimate
 from joulepath.optimizer.identify.estimates.grouped import solve_bounded
@@ -21,12 +21,12 @@ from joulepath.optimizer.identify.fits.base_fit import (
     base_regression,
     base_terms,
 )
+from joulepath.optimizer.identify.fits.block import TorqueData
 from joulepath.optimizer.identify.fits.curve_speed import with_curve_speeds
 from joulepath.optimizer.identify.fits.determined import with_reasons
 from joulepath.optimizer.identify.fits.torque_fit import by_held_values, held_deviations
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression
 from joulepath.optimizer.identify.logs.log import Log, LogMove
-from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import MeasuredNoise
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
@@ -86,37 +86,27 @@ def cut_into_periods(log: Log, period: float, settings: PeriodicSettings = PERIO
     return replace(log, moves=tuple(LogMove(each, each + length, False) for each in starts))
 
 
-def fit_periodic(
-    robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
-) -> tuple[Estimate, MeasuredNoise]:
-    """Maximum-likelihood estimate of base parameters and friction.
-
-    Args:
-        robot: the robot with its own figures.
-        rows: rows of whole periods, with regressors.
-        torque: motor torques (n, nq) [N·m].
-        clusters: partition of the rows.
-        options: requested figures and period.
-
-    Returns:
-        The estimate, and the measured noise.
-    """
+def fit_periodic(data: TorqueData) -> tuple[Estimate, MeasuredNoise]:
+    """Maximum-likelihood estimate of base parameters and friction from rows of whole periods, and
+    the measured noise."""
+    robot, rows, options = data.robot, data.rows, data.options
     assert options.period is not None
     count = round((rows.time[-1] - rows.time[0]) / options.period)
-    periods = torque.reshape(count, -1, robot.nq)
+    periods = data.torque.reshape(count, -1, robot.nq)
     noise = np.sqrt(periods.var(axis=0, ddof=1).mean(axis=0))
     mean = mean_period(rows, count)
-    torque, one = periods.mean(axis=0), Clusters(np.zeros(len(mean.q), dtype=np.int64), 1)
+    one = Clusters(np.zeros(len(mean.q), dtype=np.int64), 1)
+    period = replace(data, rows=mean, torque=periods.mean(axis=0), clusters=one)
     measured = MeasuredNoise(periods=count, deviation=noise, excess=np.nan)
 
     def fit(speeds: Array | None) -> Estimate:
         nonlocal measured
-        arm = base_regression(robot, mean, torque, one, options, speeds)
-        found, excess = _most_likely(base_terms(robot, arm, options), arm, measured, clusters)
+        arm = base_regression(period, speeds)
+        found, excess = _most_likely(base_terms(robot, arm, options), arm, measured, data.clusters)
         measured = replace(measured, excess=excess)
         return found
 
-    return with_curve_speeds(fit, robot, mean, torque, one, options), measured
+    return with_curve_speeds(fit, period), measured
 
 
 def _most_likely(

@@ -20,6 +20,7 @@ from joulepath.optimizer.identify.estimates.grouped import RANK, GroupedEquation
 from joulepath.optimizer.identify.fits.block import (
     SCALE,
     JointBlock,
+    TorqueData,
     joint_block,
     weighted_solution,
 )
@@ -37,9 +38,6 @@ from joulepath.optimizer.identify.fits.determined import (
     remarks_of,
     unbounded,
 )
-from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.rows.clusters import Clusters
-from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 
 @dataclass(frozen=True)
@@ -64,29 +62,20 @@ TORQUE_FIT = TorqueFitSettings()
 LITTLE_LOAD = "It is below {:g} standard deviations."
 
 
-def fit_torques(
-    robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
-) -> Estimate:
-    """Fit friction and rotor inertia of all joints.
-
-    Args:
-        robot: the robot with its own figures.
-        rows: rows of the logs.
-        torque: motor torques (n, nq) [N·m], NaN if not logged.
-        clusters: partition of the rows for the jackknife.
-        options: requested figures.
-    """
+def fit_torques(data: TorqueData) -> Estimate:
+    """Fit friction and rotor inertia of all joints."""
+    robot, options = data.robot, data.options
 
     def fit(speeds: Array | None) -> Estimate:
         blocks = [
-            joint_block(robot, rows, torque, clusters, options, joints, speeds)
+            joint_block(data, joints, speeds)
             for joints in coupled_joints(robot.nq, options.couplings)
         ]
-        found = join_estimates([_fit_block(robot, each, clusters, options) for each in blocks])
+        found = join_estimates([_fit_block(each, data) for each in blocks])
         constants = "torque_constant" in options.targets
         return _with_torque_constants(robot, found) if constants else found
 
-    return with_curve_speeds(fit, robot, rows, torque, clusters, options)
+    return with_curve_speeds(fit, data)
 
 
 def _with_torque_constants(robot: Robot, found: Estimate) -> Estimate:
@@ -131,11 +120,9 @@ def _with_torque_constants(robot: Robot, found: Estimate) -> Estimate:
     )
 
 
-def _fit_block(
-    robot: Robot, block: JointBlock, clusters: Clusters, options: IdentificationOptions
-) -> Estimate:
+def _fit_block(block: JointBlock, data: TorqueData) -> Estimate:
     """Fit a block, holding the least determined term at its own value until all are determined."""
-    held = undetermined(robot, block)
+    held, clusters = undetermined(data.robot, block), data.clusters
     while True:
         free = [k for k, name in enumerate(block.names) if name not in held]
         own = np.array([block.own[name] if name in held else 0.0 for name in block.names])
@@ -146,7 +133,7 @@ def _fit_block(
             values=block.values - block.columns @ own - block.kept_torque(held),
             lower=block.lower[free],
         )
-        value, weight = weighted_solution(part, clusters, options)
+        value, weight = weighted_solution(part, data)
         grouped = GroupedEquations.of(
             part.columns, part.values, weight, block.cluster, clusters.count
         )

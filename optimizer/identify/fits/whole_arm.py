@@ -6,12 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from joulepath.models.robot import Array, Robot
+from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.link_regressor import body_parameters
-from joulepath.optimizer.identify.fits.block import JointBlock, joint_block, moving_rows
-from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.rows.clusters import Clusters
-from joulepath.optimizer.identify.rows.fit_rows import Rows
+from joulepath.optimizer.identify.fits.block import JointBlock, TorqueData, joint_block, moving_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,31 +34,20 @@ class WholeArmRegression:
 
 
 def whole_arm_regression(
-    robot: Robot,
-    rows: Rows,
-    torque: Array,
-    clusters: Clusters,
-    options: IdentificationOptions,
-    bodies: Array,
-    change: Array,
-    speeds: Array | None,
+    data: TorqueData, bodies: Array, change: Array, speeds: Array | None
 ) -> WholeArmRegression:
     """Regression of all joints.
 
     Args:
-        robot: the robot with its own figures.
-        rows: rows of the logs.
-        torque: motor torques (n, nq) [N·m], NaN if not logged.
-        clusters: partition of the rows.
-        options: requested figures.
+        data: data of the fit.
         bodies: regressor (n, nq, 10 bodies) of the links, and of further bodies to be found.
         change: change (10 nq,) of the links' parameters already contained in `rows.rigid`.
         speeds: speeds (nq,) of the curved terms [rad/s]; None for the robot's own.
     """
-    joints = range(robot.nq)
-    block = joint_block(robot, rows, torque, clusters, options, joints, speeds)
+    joints, options = range(data.robot.nq), data.options
+    block = joint_block(data, joints, speeds)
     uses = [
-        moving_rows(rows, torque, joint, options.velocity_threshold, options.couplings)
+        moving_rows(data.rows, data.torque, joint, options.velocity_threshold, options.couplings)
         for joint in joints
     ]
     ends = np.cumsum([int(use.sum()) for use in uses])
@@ -69,5 +55,5 @@ def whole_arm_regression(
     # filled in place: this is the largest array of a fit
     for joint, (use, part) in enumerate(zip(uses, np.split(columns, ends[:-1]), strict=True)):
         part[:] = bodies[use, joint]
-    known = body_parameters(robot.model) + change
+    known = body_parameters(data.robot.model) + change
     return WholeArmRegression(columns, block, block.values + columns[:, : len(known)] @ known)

@@ -19,7 +19,7 @@ from joulepath.optimizer.identify.arm.friction_columns import COUPLED, SENSOR_GA
 from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.estimates.grouped import GroupedEquations
-from joulepath.optimizer.identify.fits.block import JointBlock, LawEquations
+from joulepath.optimizer.identify.fits.block import JointBlock, LawEquations, TorqueData
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
 from joulepath.optimizer.identify.fits.curve_speed import with_curve_speeds
 from joulepath.optimizer.identify.fits.determined import (
@@ -35,7 +35,6 @@ from joulepath.optimizer.identify.fits.torque_fit import (
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression, whole_arm_regression
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters, effective_weights
-from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 LINK = "inertials."
 LINK_NAMES = frozenset(LINK + part for part in LINKS)
@@ -67,39 +66,22 @@ class WholeFitSettings:
 WHOLE_FIT = WholeFitSettings()
 
 
-def fit_whole(
-    robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
-) -> Estimate:
-    """Fit friction, rotors and couplings, and the 10 nq parameters of the links.
-
-    Args:
-        robot: the robot with its own figures.
-        rows: rows with regressors.
-        torque: motor torques (n, nq) [N·m], NaN if not logged.
-        clusters: partition of the rows for the jackknife.
-        options: requested figures and weight of the prior.
-    """
-    given = robot, rows, torque, clusters, options
-    return with_curve_speeds(lambda speeds: _fit(*given, speeds), *given)
+def fit_whole(data: TorqueData) -> Estimate:
+    """Fit friction, rotors and couplings, and the 10 nq parameters of the links."""
+    return with_curve_speeds(lambda speeds: _fit(data, speeds), data)
 
 
-def _fit(
-    robot: Robot,
-    rows: Rows,
-    torque: Array,
-    clusters: Clusters,
-    options: IdentificationOptions,
-    speeds: Array | None,
-) -> Estimate:
+def _fit(data: TorqueData, speeds: Array | None) -> Estimate:
     """The fit of `fit_whole`, for given speeds (nq,) of the curved terms."""
+    robot, rows, options = data.robot, data.rows, data.options
     own, bodies = body_parameters(robot.model), rows.regressor
     assert bodies is not None
     change, held = np.zeros_like(own), dict[Name, str]()
     for _ in range(WHOLE_FIT.load_passes):
-        now = replace(rows, rigid=rows.rigid + bodies @ change)
-        arm = whole_arm_regression(robot, now, torque, clusters, options, bodies, change, speeds)
+        now = replace(data, rows=replace(rows, rigid=rows.rigid + bodies @ change))
+        arm = whole_arm_regression(now, bodies, change, speeds)
         held |= undetermined(robot, arm.block)
-        equations = _weighted(robot, arm, clusters, options, held)
+        equations = _weighted(data, arm, held)
         # the columns are large, and the next pass needs the memory
         block = replace(arm.block, columns=np.zeros((0, len(arm.block.names))))
         del arm, now
@@ -243,16 +225,10 @@ def _solution_of(
     return value
 
 
-def _weighted(
-    robot: Robot,
-    arm: WholeArmRegression,
-    clusters: Clusters,
-    options: IdentificationOptions,
-    held: Mapping[Name, str],
-) -> LawEquations:
+def _weighted(data: TorqueData, arm: WholeArmRegression, held: Mapping[Name, str]) -> LawEquations:
     """Normal equations, weighted by the residuals of a solution with some terms `held`."""
-    block = arm.block
-    mean, precision = _prior(robot, block, options)
+    robot, clusters, block = data.robot, data.clusters, arm.block
+    mean, precision = _prior(robot, block, data.options)
     bodies = arm.bodies.shape[1]
     free, lower = _free(block, bodies, held), _lower(block, bodies)
     values = arm.values - block.kept_torque(held)
@@ -271,6 +247,6 @@ def _weighted(
             arm.values,
             values - arm.torque(value),
             of_row,
-            options.estimator == "irls",
+            data.options.estimator == "irls",
         )
     return equations
