@@ -77,9 +77,14 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
     from joulepath.app.convert.json_text import parsed_json
     from joulepath.app.exceptions.base import InvalidRequest
     from joulepath.app.http.problems import invalid_request
+    from joulepath.app.schemas.deadline import given_deadline, too_long
+    from joulepath.app.settings import LONGEST_DEADLINE
 
     try:
-        return model.model_validate(parsed_json(body))
+        asked = model.model_validate(parsed_json(body))
+        if wrong := too_long(given_deadline(asked), LONGEST_DEADLINE, "body"):
+            raise InvalidRequest(wrong)
+        return asked
     except InvalidRequest as error:
         raise refused(error, request_id) from None
     except ValidationError as error:

@@ -9,6 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from joulepath.app.schemas.arm import ArmRequest, one_or_each
 from joulepath.app.schemas.common import JointPositions, Request, described
+from joulepath.app.schemas.deadline import DeadlineSeconds
 from joulepath.app.schemas.examples.values import LOG_ID
 from joulepath.app.schemas.examples.values import PAPER_HOME as _HOME
 from joulepath.app.schemas.examples.values import PAPER_POSE as _THERE
@@ -113,14 +114,12 @@ class EvaluateSettings(ArmRequest):
         ge=DURATIONS.least_period,
         le=3600,
     )
-    deadline: float | None = described(
+    deadline: DeadlineSeconds | None = described(
         "Wall time from the end of the upload, including the wait for a worker. Null: the longest "
         "that the service allows.",
         "s",
         10.0,
         default=None,
-        ge=1e-3,
-        le=DURATIONS.longest,
     )
 
 

@@ -16,10 +16,10 @@ from joulepath.app.schemas.common import (
     described,
     number_or_object,
 )
+from joulepath.app.schemas.deadline import DeadlineSeconds
 from joulepath.app.schemas.examples.values import HOME
 from joulepath.app.schemas.orientation import TargetPose
 from joulepath.app.schemas.path import Path
-from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.problem.problem import DURATIONS, MethodName, RequestedBound
 from joulepath.optimizer.result.energy import Objective
@@ -235,14 +235,12 @@ class MotionRequest(ArmRequest):
         le=1,
         validate_default=True,
     )
-    deadline: float = described(
+    deadline: DeadlineSeconds = described(
         "Wall time from the arrival of the request, including the wait for a worker. When it "
         "passes, the service returns the best certified motion found so far.",
         "s",
         10.0,
         default=10.0,
-        ge=1e-3,
-        le=LONGEST_DEADLINE,
     )
 
     @field_validator("sample_period")

@@ -15,6 +15,7 @@ from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import FieldError, InvalidRequest
 from joulepath.app.http.problems import MOST_ERRORS, invalid_request
 from joulepath.app.schemas.common import Request
+from joulepath.app.schemas.deadline import given_deadline, too_long
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.jobs import KINDS
 from joulepath.app.schemas.jobs import NewJob as JobModel
@@ -95,9 +96,8 @@ class JobOfOneTask:
 def job_of_one(kind: str, asked: Request, deadlines: Deadlines, fresh: bool) -> NewJob:
     """A validated request as a job; `fresh`: the answer of an equal one does not do. Raises
     InvalidRequest if its deadline is too long."""
-    too_long = _too_long(asked, deadlines)
-    if too_long is not None:
-        raise InvalidRequest([{"loc": ["body", "deadline"], "msg": too_long}])
+    if wrong := too_long(given_deadline(asked), deadlines.longest, "body"):
+        raise InvalidRequest(wrong)
     requests = [_new_request(kind, asked, deadlines, fresh)]
     return NewJob(requests, _fingerprint(requests, "one"))
 
@@ -108,21 +108,13 @@ def _job(asked: JobModel, deadlines: Deadlines, fresh: bool) -> NewJob:
     for index, each in enumerate(asked.requests):
         kind = next(kind for kind in KINDS if hasattr(each, kind))
         request: Request = getattr(each, kind)
-        too_long = _too_long(request, deadlines)
-        if too_long is not None:
-            wrong.append({"loc": ["body", "requests", index, kind, "deadline"], "msg": too_long})
-        else:
-            requests.append(_new_request(kind, request, deadlines, fresh, each.name))
+        where = ("body", "requests", index, kind)
+        wrong += too_long(given_deadline(request), deadlines.longest, *where)
+        requests.append(_new_request(kind, request, deadlines, fresh, each.name))
     if wrong:
         raise InvalidRequest(wrong[:MOST_ERRORS])
     told_apart_by = f"{asked.keep_going} {asked.name}"
     return NewJob(requests, _fingerprint(requests, told_apart_by), asked.name, asked.keep_going)
-
-
-def _too_long(asked: Request, deadlines: Deadlines) -> str | None:
-    given = getattr(asked, "deadline", None) if "deadline" in asked.model_fields_set else None
-    too_long = given is not None and given > deadlines.longest
-    return f"deadline must be at most {deadlines.longest:g} s." if too_long else None
 
 
 def _new_request(

@@ -10,6 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from joulepath.app.schemas.arm import ArmRequest, MoveLimits, Payload
 from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, Request, described
+from joulepath.app.schemas.deadline import DeadlineSeconds
 from joulepath.app.schemas.path import Line, StopPath
 from joulepath.app.schemas.request import (
     SECONDS_OR_RANGE,
@@ -20,7 +21,6 @@ from joulepath.app.schemas.request import (
     WhichCandidates,
     which_candidates,
 )
-from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.optimizer.problem.cycle import CYCLE_RANGES
 from joulepath.optimizer.problem.free_order import MOST_FREE_STOPS
 from joulepath.optimizer.problem.names import LONGEST_NAME
@@ -279,15 +279,13 @@ class CycleRequest(ArmRequest):
         ge=DURATIONS.least_period,
         le=1,
     )
-    deadline: float = described(
+    deadline: DeadlineSeconds = described(
         "Wall time from the arrival of the request, including the wait for a worker. When it "
         "nears, the service returns the best certified cycle found so far. With more than "
         f"{LONG_CYCLE.stops} stops, the default is {LONG_CYCLE.deadline:g} s.",
         "s",
         60.0,
         default=60.0,
-        ge=1e-3,
-        le=LONGEST_DEADLINE,
     )
 
     @field_validator("sample_period")

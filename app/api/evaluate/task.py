@@ -27,6 +27,7 @@ from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.http.problems import invalid_request
+from joulepath.app.schemas.deadline import too_long
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
 from joulepath.optimizer.csv_table import FIRST_ROW
 from joulepath.optimizer.deadline import Deadline
@@ -203,12 +204,8 @@ class EvaluateTask:
 
     def _end(self, asked: EvaluateSettings, began: Deadline, where: str) -> Deadline:
         """The deadline. Raises InvalidRequest at `where` if it is too long."""
-        if asked.deadline is not None and asked.deadline > self.longest:
-            msg = (
-                f"deadline must be at most {self.longest:g} s: the operator of the service has set "
-                "this."
-            )
-            raise InvalidRequest([{"loc": [where, "deadline"], "msg": msg}])
+        if wrong := too_long(asked.deadline, self.longest, where):
+            raise InvalidRequest(wrong)
         return began.earlier_by(-(asked.deadline or self.longest))
 
 

@@ -15,6 +15,7 @@ from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import described
+from joulepath.app.schemas.deadline import DeadlineSeconds
 from joulepath.app.schemas.examples.values import HOME
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.excitation.excitation_problem import (
@@ -96,14 +97,12 @@ class ExcitationRequest(ArmRequest):
         ge=DURATIONS.least_period,
         le=1,
     )
-    deadline: float = described(
+    deadline: DeadlineSeconds = described(
         "Wall time from the arrival of the request, including the wait for a worker. When it "
         "passes, the service returns the best certified motion found so far.",
         "s",
         5.0,
         default=60.0,
-        ge=1e-3,
-        le=600,
     )
 
 

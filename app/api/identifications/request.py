@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from joulepath.app.schemas.common import Request, described
+from joulepath.app.schemas.deadline import DeadlineSeconds
 from joulepath.app.schemas.examples.values import LOG_ID
 from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Method, Target, Term
 
@@ -131,8 +132,8 @@ class IdentifyRequest(Request):
             default=None,
         )
     )
-    deadline: float = described(
-        "Longest time of the fit.", "s", DEADLINE, default=DEADLINE, gt=0, le=3600
+    deadline: DeadlineSeconds = described(
+        "Longest time of the fit.", "s", DEADLINE, default=DEADLINE
     )
 
     @property

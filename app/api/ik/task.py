@@ -13,6 +13,7 @@ from joulepath.app.convert.tool import to_tcp, to_tool
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.common import described
+from joulepath.app.schemas.deadline import DeadlineSeconds
 from joulepath.app.schemas.examples.values import BOX
 from joulepath.app.schemas.orientation import TargetPose
 from joulepath.app.schemas.scene import CarriedBody, CellRequest
@@ -20,7 +21,6 @@ from joulepath.models.robot import Robot
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.inverse_kinematics import IKSolution, IKSolutions, inverse_kinematics
 from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.problem import DURATIONS
 
 
 class IKRequest(CellRequest):
@@ -45,13 +45,11 @@ class IKRequest(CellRequest):
         {"shape": BOX},
         default=None,
     )
-    deadline: float = described(
+    deadline: DeadlineSeconds = described(
         "Wall time from the arrival of the request, including the wait for a worker.",
         "s",
         10.0,
         default=10.0,
-        ge=1e-3,
-        le=DURATIONS.longest,
     )
 
 

@@ -14,8 +14,8 @@ from joulepath.app.convert.request import to_problem
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.common import described
+from joulepath.app.schemas.deadline import DeadlineSeconds
 from joulepath.app.schemas.request import DurationRange, OptimizeRequest
-from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.app.tasks.answer_collector import AnswerCollector
 from joulepath.optimizer.declared import Joules, NotEmpty, Ratio, Seconds, Watts
 from joulepath.optimizer.pareto import PARETO, pareto
@@ -44,14 +44,12 @@ class ParetoRequest(OptimizeRequest):
         {"max": 3.0},
         default=None,
     )
-    deadline: float = described(
+    deadline: DeadlineSeconds = described(
         "Wall time for the whole front, including the wait for a worker. When it passes, the "
         "service returns the front found so far.",
         "s",
         30.0,
         default=30.0,
-        ge=1e-3,
-        le=LONGEST_DEADLINE,
     )
 
 

@@ -9,8 +9,8 @@ from pydantic_core import PydanticCustomError
 
 from joulepath.app.api.cycle.request import CycleRequest, PlainName
 from joulepath.app.schemas.common import IDENTITY, Pose, Request, described
+from joulepath.app.schemas.deadline import DeadlineSeconds
 from joulepath.app.schemas.examples.values import OPTIMIZE, at
-from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.models.shape_sizes import SIZES
 from joulepath.optimizer.placement.map_axis import MAP
 from joulepath.optimizer.placement.placement import PLACEMENT_RANGES
@@ -202,15 +202,13 @@ class PlacementRequest(Request):
         ge=PLACEMENT_RANGES.finest,
         le=PLACEMENT_RANGES.coarsest,
     )
-    deadline: float = described(
+    deadline: DeadlineSeconds = described(
         "Wall time from the arrival of the request, including the wait for a worker. When it "
         "nears, the service returns the best place and the map so far. The `deadline` of a cycle "
         "is the longest time for it at one place.",
         "s",
         120.0,
         default=120.0,
-        ge=1e-3,
-        le=LONGEST_DEADLINE,
     )
 
     @model_validator(mode="after")

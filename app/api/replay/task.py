@@ -16,8 +16,8 @@ from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.problems import invalid_request
 from joulepath.app.schemas.common import Request, described
+from joulepath.app.schemas.deadline import DeadlineSeconds
 from joulepath.app.schemas.given_answer import AnswerRequest
-from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.app.tasks.kept_answers import kept_answers
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.declared import NotEmpty, Seconds
@@ -89,13 +89,11 @@ class ReplayRequest(AnswerRequest):
         {"payload": 0.1, "friction": 0.3},
         default=None,
     )
-    deadline: float = described(
+    deadline: DeadlineSeconds = described(
         "Wall time from the arrival of the request, including the wait for a worker.",
         "s",
         60.0,
         default=60.0,
-        ge=1e-3,
-        le=LONGEST_DEADLINE,
     )
 
 

@@ -11,6 +11,7 @@ from joulepath.app.http.event_stream import EVENT_STREAM
 from joulepath.app.http.handlers import CACHE_HEADER
 from joulepath.app.http.weights import is_wanted
 from joulepath.app.schemas.common import KEY_HEADER
+from joulepath.app.schemas.deadline import too_long
 from joulepath.app.schemas.examples.values import STUDY_ID
 from joulepath.app.schemas.studies import IdempotencyKey
 
@@ -52,12 +53,9 @@ def allowed_deadline(
     Raises:
         InvalidRequest: `given` exceeds `longest`.
     """
-    if given is None:
-        return min(default, longest)
-    if given > longest:
-        msg = f"deadline must be at most {longest:g} s: the operator of the service has set this."
-        raise InvalidRequest([{"loc": [where, "deadline"], "msg": msg}])
-    return given
+    if wrong := too_long(given, longest, where):
+        raise InvalidRequest(wrong)
+    return min(default, longest) if given is None else given
 
 
 async def _wanted_format(request: Request) -> Literal["json", "csv"]:

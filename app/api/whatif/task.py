@@ -30,11 +30,11 @@ from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import Request, described
+from joulepath.app.schemas.deadline import DeadlineSeconds
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.values import EVALUATE, OPTIMIZE
 from joulepath.app.schemas.queries import Name
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.app.tasks.answer_collector import AnswerCollector, certified
 from joulepath.optimizer.deadline import Deadline, DeadlineShares
 from joulepath.optimizer.evaluate.evaluate import evaluate
@@ -115,14 +115,12 @@ class WhatifRequest(Request):
         None,
         [{"name": "links of half the mass", "arm": {"link_mass_scale": 0.5}}],
     )
-    deadline: float = described(
+    deadline: DeadlineSeconds = described(
         "Wall time for all runs together, including the wait for a worker. Each run gets an equal "
         "share of the time that is left.",
         "s",
         30.0,
         default=30.0,
-        ge=1e-3,
-        le=LONGEST_DEADLINE,
     )
 
     @model_validator(mode="after")

@@ -339,7 +339,7 @@ def test_limits_of_the_service() -> None:
         (error,) = refused(small.post("/jobs", json=late), InvalidRequest)["errors"]
         assert error == {
             "loc": ["body", "requests", 1, "optimize", "deadline"],
-            "msg": "deadline must be at most 5 s.",
+            "msg": "Give a number of at most 5: no longer deadline is allowed here.",
         }
         answer = small.post("/optimize", json=move(deadline=6.0), headers=LATER)
         assert refused(answer, InvalidRequest)["errors"][0]["loc"] == ["body", "deadline"]

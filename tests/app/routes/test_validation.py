@@ -393,6 +393,23 @@ def test_a_byte_order_mark_is_no_error(client: TestClient) -> None:
     )
 
 
+@pytest.mark.parametrize("deadline", [1e4, 3600.0, 121.0])
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [
+        ("/optimize", move()),
+        ("/ik", {"pose": POSE}),
+        ("/evaluate", {"configurations": [HOME, HOME], "time_per_segment": 1.0}),
+    ],
+)
+def test_a_long_deadline_is_told_the_limit_in_force(
+    client: TestClient, path: str, body: dict[str, Any], deadline: float
+) -> None:
+    (error,) = refused(client, body | {"deadline": deadline}, path)
+    assert error["loc"] == ["body", "deadline"]
+    assert error["msg"] == "Give a number of at most 120: no longer deadline is allowed here."
+
+
 @pytest.mark.parametrize("deadline", [1e6, 599])
 def test_a_deadline_in_a_query_is_named_there(client: TestClient, deadline: float) -> None:
     study = client.post("/studies", json={"name": "A study", "threshold": 1.0}).headers["location"]

@@ -24,12 +24,12 @@ from joulepath.app.schemas.common import (
     described,
     frame_of,
 )
+from joulepath.app.schemas.deadline import DeadlineSeconds
 from joulepath.app.schemas.examples.values import HOME
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.declared import PerSample, PerSampleAndJoint, Seconds, Unit
 from joulepath.optimizer.kinematics.tool_path.path_following import PathPoint, follow
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.problem import DURATIONS
 
 MOST_PATH_POINTS = 1000
 """Largest number of points of a path."""
@@ -84,14 +84,12 @@ class IKPathRequest(RobotWithTcp):
         ge=0,
         le=1,
     )
-    deadline: float = described(
+    deadline: DeadlineSeconds = described(
         "Wall time from the arrival of the request, including the wait for a worker. After it, no "
         "further point is tried.",
         "s",
         10.0,
         default=10.0,
-        ge=1e-3,
-        le=DURATIONS.longest,
     )
 
     @model_validator(mode="after")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, Literal
 
 from joulepath.app.schemas.common import Response, described, part
+from joulepath.app.schemas.deadline import DeadlineSeconds
 from joulepath.app.schemas.examples.values import OPTIMIZE, STUDY_ID
 from joulepath.app.schemas.queries import Query
 from joulepath.app.schemas.studies import IterationEnergy
@@ -21,15 +22,13 @@ class SuggestQuery(Query):
         "best",
         default="best",
     )
-    deadline: float | None = described(
+    deadline: DeadlineSeconds | None = described(
         "Wall time for all suggestions together; those without a result by then are in "
         f"`not_computed`. Null: {DEFAULT_DEADLINE:g} s, or the service's largest deadline if that "
         "is shorter.",
         "s",
         10.0,
         default=None,
-        ge=1e-3,
-        le=600,
     )
 
 
