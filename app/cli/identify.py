@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import json
 import shutil
 from io import BytesIO
 from pathlib import Path
@@ -13,8 +12,9 @@ import click
 
 from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import OUTPUT, answered, new_id, parsed, validated, write
+from joulepath.app.cli.field_options import FieldCommand, Fields, given_fields
 from joulepath.app.cli.terminal import table
-from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Method, Target, Term
+from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Term
 
 if TYPE_CHECKING:
     from joulepath.app.convert.recorded import GivenLog
@@ -25,66 +25,69 @@ FILE_ID = "file"
 """Stand-in for the ids of stored logs: those of a command are files."""
 
 
-class _Json(click.ParamType[dict[str, Any], Any]):
-    """A mapping in JSON."""
+FITTED = (
+    "fit",
+    "method",
+    "period",
+    "estimator",
+    "velocity_threshold",
+    "prior_weight",
+    "deadline",
+)
+FRICTION = ("knee",)
+LOGGED = ("robot", "units", "effort", "current_units", "torque_side", "columns")
+"""Fields of requests that are options of the same names."""
 
-    name = "JSON"
+
+class _Validation(click.ParamType[Any, Any]):
+    """A file, a fraction, or `moves`."""
+
+    name = "FILE|FRACTION|moves"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> dict[str, Any]:
-        """The mapping."""
+    ) -> Path | float | str:
+        """The path of a file, the fraction, or `moves`."""
+        if Path(value).is_file():
+            return Path(value)
+        if value == "moves":
+            return "moves"
         try:
-            content = json.loads(value)
-        except ValueError as error:
-            self.fail(f"is no JSON: {error}", param, ctx)
-        if not isinstance(content, dict):
-            self.fail("must be a mapping, as {...}.", param, ctx)
-        return content
+            return float(value)
+        except ValueError:
+            hint = "name a file, a fraction as 0.3, or moves."
+            self.fail(f"{value!r} is no file: {hint}", param, ctx)
+
+
+def _fields() -> Fields:
+    from joulepath.app.api.identifications.request import FrictionTerms, IdentifyRequest
+    from joulepath.app.api.logs.request import LogSettings
+
+    return {IdentifyRequest: FITTED, FrictionTerms: FRICTION, LogSettings: LOGGED}
 
 
 @click.command(
+    cls=FieldCommand,
+    fields=_fields,
     epilog="""\b
 Examples:
   joulepath identify monday.csv --robot ur10e
   joulepath identify cold.csv warm.csv --validate friday.csv --refit --output figures.json
   joulepath identify empty.csv loaded.csv --fit payload
   joulepath identify monday.csv --validate friday.csv --format moves
-  joulepath identify excitation.csv --method periodic --period 10 --validate friday.csv"""
+  joulepath identify excitation.csv --method periodic --period 10 --validate friday.csv""",
 )
 @click.argument(
     "logs", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path)
 )
 @OUTPUT
-@click.option("--robot", default="ur5e", show_default=True, help="Name of the robot.")
 @click.option(
     "--validate",
     "others",
     multiple=True,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="A log that validates the figures, and that no fit sees. May be repeated. Default: a "
-    "third of the motions.",
-)
-@click.option(
-    "--fit",
-    multiple=True,
-    type=click.Choice(get_args(Target)),
-    default=("friction", "rotor"),
-    show_default=True,
-    help="What is found. May be repeated. Power is added where the logs have it; payload is that "
-    "of the last log.",
-)
-@click.option(
-    "--method",
-    type=click.Choice(get_args(Method)),
-    default="automatic",
-    show_default=True,
-    help="How it is found; docs/reference/identification.md says what each method needs.",
-)
-@click.option(
-    "--period",
-    type=click.FloatRange(0.1, 1e4),
-    help="Period of the motion [s], for --method periodic.",
+    type=_Validation(),
+    help="What validates the figures, and no fit sees: another log, which may be repeated; a "
+    "fraction of the moves; or `moves`, each motion in its turn. Default: 0.3.",
 )
 @click.option(
     "--term",
@@ -102,12 +105,6 @@ Examples:
     "measured behind the gears alone.",
 )
 @click.option(
-    "--estimator",
-    type=click.Choice(get_args(Estimator)),
-    default="wls",
-    help="irls: against outliers.",
-)
-@click.option(
     "--payload",
     type=click.FloatRange(0),
     help="Mass at the flange [kg]. Default: what the logs say.",
@@ -116,27 +113,9 @@ Examples:
     "--com", type=(float, float, float), default=(0.0, 0.0, 0.0), help="Its centre of mass [m]."
 )
 @click.option(
-    "--units", type=click.Choice(["rad", "deg"]), default="rad", help="Units of all joint columns."
-)
-@click.option(
-    "--effort",
-    type=click.Choice(["auto", "current", "torque", "external"]),
-    default="auto",
-    help="What efforts are.",
-)
-@click.option(
-    "--columns",
-    type=_Json(),
-    help="Names of the columns, or their numbers from 1, as JSON: "
-    """'{"time": 1, "q": [2, 3, 4, 5, 6, 7]}'.""",
-)
-@click.option(
     "--gravity",
     type=(float, float, float),
     help="Gravity in the base frame [m/s²]. Default: that of the robot.",
-)
-@click.option(
-    "--current-units", type=click.Choice(["A", "mA"]), default="A", help="Unit of currents."
 )
 @click.option(
     "--mains",
@@ -154,33 +133,18 @@ Examples:
     help="Kind of the answer; `moves`: a table to read, measured against predicted energy of the "
     "moves that no fit has seen, and of their cycles.",
 )
-@click.option(
-    "--torque-side",
-    type=click.Choice(["motor", "link"]),
-    help="Where torques were measured: at the motor, or behind the gear. Default: as the robot's "
-    "torque limits.",
-)
 def identify(
     logs: tuple[Path, ...],
     output: Path | None,
-    robot: str,
-    others: tuple[Path, ...],
-    fit: tuple[str, ...],
-    method: str,
-    period: float | None,
+    others: tuple[Path | float | str, ...],
     terms: tuple[str, ...],
     refit: bool | None,
-    estimator: str,
     payload: float | None,
     com: tuple[float, float, float],
-    units: str,
-    effort: str,
-    columns: dict[str, Any] | None,
     gravity: tuple[float, float, float] | None,
-    current_units: str,
-    torque_side: str | None,
     mains: tuple[float, ...],
     wanted: Literal["json", "moves"],
+    **options: Any,
 ) -> None:
     """Finds the figures of one arm from its LOGS, with their standard deviations.
 
@@ -191,28 +155,22 @@ def identify(
     from joulepath.app.api.identifications.request import IdentifyRequest
 
     request_id = new_id()
+    unseen = [each for each in others if isinstance(each, Path)]
+    if len(others) > max(1, len(unseen)):
+        raise click.UsageError("--validate takes files, or one fraction, or moves.")
     carried = None if payload is None else {"mass": payload, "com": list(com)}
-    settings: dict[str, Any] = {
-        "robot": robot,
-        "payload": carried,
-        "units": units,
-        "effort": effort,
-        "columns": columns,
-        "gravity": gravity,
-        "current_units": current_units,
-        "torque_side": torque_side,
-    }
-    read = tuple(read_log_file(settings, file, request_id) for file in (*logs, *others))
-    body: dict[str, Any] = {
+    settings = given_fields(LOGGED, options) | {"payload": carried, "gravity": gravity}
+    read = tuple(read_log_file(settings, file, request_id) for file in (*logs, *unseen))
+    body = given_fields(FITTED, options) | {
         "logs": [FILE_ID] * len(logs),
-        "estimator": estimator,
-        "fit": list(fit),
+        "inertials": "automatic" if refit is None else "refit" if refit else "keep",
+        "friction": given_fields(FRICTION, options) | {"terms": list(terms)},
     }
-    inertials = "automatic" if refit is None else "refit" if refit else "keep"
-    body |= {"method": method, "period": period, "inertials": inertials}
-    body |= {"friction": {"terms": list(terms)}}
     body |= {"mains": list(mains)} if mains else {}
-    body |= {"validate": [FILE_ID] * len(others)} if others else {}
+    if others:
+        (only, *_) = others
+        by = {"fraction": only} if isinstance(only, float) else only
+        body["validate"] = [FILE_ID] * len(unseen) or by
     asked = validated(IdentifyRequest, _json(body), request_id)
     with terminal.steps(f"Identifying from {len(logs)} log{'s' if len(logs) > 1 else ''}"):
         answer = _answered(asked, read, request_id)

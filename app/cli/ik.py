@@ -1,14 +1,24 @@
-"""`joulepath ik`."""
+"""`joulepath ik` and `joulepath ik-path`."""
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Any, Literal
 
 import click
 
 from joulepath.app.cli import terminal
-from joulepath.app.cli.answer import OUTPUT, answered, new_id, parsed, validated, write
+from joulepath.app.cli.answer import (
+    FILE,
+    OUTPUT,
+    answered,
+    content_of,
+    new_id,
+    parsed,
+    validated,
+    write,
+)
 from joulepath.app.cli.motion_request import OPTIONAL_FILE, ROBOT, Target, body_of
 from joulepath.app.cli.search import FORMAT
 
@@ -64,3 +74,33 @@ def summary_of(answer: dict[str, Any]) -> dict[str, str]:
         "colliding": str(sum(each["collides"] for each in found)),
         "complete": "yes" if answer["complete"] else "no, some may be missing",
     }
+
+
+@click.command(
+    epilog="""\b
+Examples:
+  joulepath ik-path examples/ik/path/around_the_singularity.json --output path.json"""
+)
+@FILE
+@OUTPUT
+def ik_path(file: str, output: Path | None) -> None:
+    """Finds arm configurations along a path of the TCP.
+
+    FILE is the JSON of `POST /ik/path`, or - for standard input. The answer is JSON, too; its
+    `trajectory` is one of `joulepath evaluate`. If standard error is a terminal, a summary follows:
+    the points in the trajectory, and why the others are not.
+    """
+    from joulepath.app.api.ik.path.task import IKPathRequest, IKPathTask
+
+    request_id = new_id()
+    request = validated(IKPathRequest, content_of(file), request_id)
+    found = answered(IKPathTask(request, request_id), request.deadline, request_id)
+    write(found, output)
+    terminal.summary(lambda: path_summary(parsed(found)))
+
+
+def path_summary(answer: dict[str, Any]) -> dict[str, str]:
+    """The lines of the summary by their titles."""
+    reasons = Counter(each["reason"] for each in answer["points"])
+    written = {"in the trajectory": f"{reasons.pop(None, 0)} of {len(answer['points'])} points"}
+    return written | {reason.replace("_", " "): str(count) for reason, count in reasons.items()}

@@ -12,7 +12,7 @@ from joulepath.app.cli.evaluate import evaluate
 from joulepath.app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID, interruptible
 from joulepath.app.cli.export import export
 from joulepath.app.cli.identify import identify
-from joulepath.app.cli.ik import ik
+from joulepath.app.cli.ik import ik, ik_path
 from joulepath.app.cli.jobs import jobs
 from joulepath.app.cli.keys import keys
 from joulepath.app.cli.rename import rename
@@ -20,6 +20,7 @@ from joulepath.app.cli.replay import replay
 from joulepath.app.cli.report import check, report
 from joulepath.app.cli.robots import robots
 from joulepath.app.cli.searches import (
+    advice,
     compare,
     cycle,
     excitation,
@@ -71,7 +72,9 @@ for command in (
     placement,
     evaluate,
     whatif,
+    advice,
     ik,
+    ik_path,
     export,
     replay,
     excitation,

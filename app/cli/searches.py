@@ -1,5 +1,5 @@
 """Commands that search for motions: `joulepath optimize`, `pareto`, `compare`, `cycle`,
-`placement`, `whatif` and `excitation`.
+`placement`, `whatif`, `advice` and `excitation`.
 """
 
 from __future__ import annotations
@@ -232,6 +232,34 @@ def whatif_summary(answer: dict[str, Any]) -> dict[str, str]:
 def _energy(motion: dict[str, Any], objective: str) -> dict[str, float]:
     found: dict[str, Any] = motion[objective]
     return found if objective == "mechanical" else found["total"]
+
+
+@click.command(
+    epilog="""\b
+Example:
+  joulepath advice examples/advice/pose_to_pose.json --output advice.json"""
+)
+@FILE
+@OUTPUT
+def advice(file: str, output: Path | None) -> None:
+    """Finds changes of a motion or a cycle that need less energy.
+
+    FILE is the JSON of `POST /advice`, or - for standard input. The answer is JSON, too. If
+    standard error is a terminal, a summary follows: the energy as it is, and of each change.
+    """
+    from joulepath.app.api.advice.request import AdviceRequest
+    from joulepath.app.api.advice.task import AdviceTask
+
+    search(AdviceRequest, AdviceTask, content_of(file), output, advice_summary)
+
+
+def advice_summary(answer: dict[str, Any]) -> dict[str, str]:
+    """The lines of the summary by their titles."""
+    return {"as it is": f"{answer['energy']:.4g} J electrical"} | {
+        each["name"].replace("_", " "): f"{each['energy']:.4g} J instead of "
+        f"{each['instead_of']:.4g} J"
+        for each in answer["advice"]
+    }
 
 
 @click.command(

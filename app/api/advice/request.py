@@ -71,6 +71,13 @@ class AdviceRequest(AnsweredRequest):
         max_length=len(get_args(AdviceName)),
     )
 
+    @property
+    def deadline(self) -> float:
+        """Wall time of the motion or the cycle and of all its changes [s]."""
+        assert self.task is not None
+        changes = len(get_args(AdviceName)) if self.changes is None else len(self.changes)
+        return (1 + changes) * self.task.deadline
+
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
         if (self.optimize is None) == (self.cycle is None):

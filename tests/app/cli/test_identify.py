@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click import Context
 
 from joulepath import load_robot
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.identifications.answer import IdentificationResult
-from joulepath.app.cli.identify import moves_of, summary_of
+from joulepath.app.cli.identify import identify, moves_of, summary_of
 from tests.app.cli.console import Here
 from tests.identification_logs import csv_of, recorded, truth_of
 
@@ -107,6 +108,48 @@ def test_what_is_found_can_be_chosen(here: Here, logs: list[str], tmp_path: Path
         "copper",
         "inverter_linear",
     }
+
+
+def test_every_field_of_a_request_has_an_option(here: Here, logs: list[str]) -> None:
+    """Values out of range are told with the names of their fields, so they have arrived."""
+    wrong = {
+        "velocity_threshold": "11",
+        "prior_weight": "0",
+        "period": "0",
+        "validate": "0.9",
+    }
+    options = [part for name, value in wrong.items() for part in (_flag(name), value)]
+    code, content = here.problem("identify", logs[0], *options, "--knee", "2")
+    places = [each["loc"][1:] for each in content["errors"]]
+    assert code == 2
+    assert {place[0] for place in places} == {*wrong, "friction"}
+    assert ["friction", "knee"] in places
+    code, content = here.problem("identify", logs[0], "--deadline", "3601")
+    assert content["errors"][0]["loc"] == ["body", "deadline"]
+
+
+def test_the_options_are_the_fields_of_the_requests() -> None:
+    from joulepath.app.api.identifications.request import FrictionTerms, IdentifyRequest
+    from joulepath.app.api.logs.request import LogSettings
+
+    names = {each.name for each in identify.get_params(Context(identify))}
+    own = {"validate_": "others", "inertials": "refit", "friction": "terms", "name": None}
+    told = [*IdentifyRequest.model_fields, *FrictionTerms.model_fields, *LogSettings.model_fields]
+    # a command has no names and tags: its files are not stored
+    assert {own.get(name, name) for name in told} - {None, "tags"} <= names
+
+
+def test_each_motion_validates_the_others(here: Here, logs: list[str], tmp_path: Path) -> None:
+    output = tmp_path / "figures.json"
+    assert here.run("identify", logs[1], "--validate", "moves", "-o", str(output))[0] == 0
+    assert RESULT.model_validate_json(output.read_bytes()).validation.moves == 3
+    assert here.run("identify", logs[1], "--validate", "moves", "--validate", logs[0])[0] == 2
+    code, _, told = here.run("identify", logs[1], "--validate", "no_such.csv")
+    assert code == 2 and b"is no file" in told
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def test_no_log_is_wrong_usage(here: Here) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from joulepath.app.answers.declared import model_of
+from joulepath.app.api.advice.task import AdviceAnswer
 from joulepath.app.api.compare.task import CompareAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.api.whatif.answer import WhatifAnswer
@@ -145,6 +146,25 @@ def test_a_change_of_the_arm(here: Here, tmp_path: Path) -> None:
     assert [*lines] == ["as it is", "heavier", "slower"]
     assert re.fullmatch(r"the same motion [\d.-]+ J, best [\d.-]+ J", lines["heavier"])
     assert lines["slower"] == answer["changes"][1]["problem"]["title"]
+
+
+def test_advice(here: Here, tmp_path: Path) -> None:
+    body = {"optimize": move(), "period": 60.0, "changes": []}
+    answer = written(here, tmp_path, "advice", "-", stdin=json.dumps(body))
+    model_of(AdviceAnswer).model_validate_json(json.dumps(answer))
+    change = {"name": "lighter_tool", "energy": 40.0, "instead_of": 50.0}
+    assert searches.advice_summary(answer | {"advice": [change]}) == {
+        "as it is": f"{answer['energy']:.4g} J electrical",
+        "lighter tool": "40 J instead of 50 J",
+    }
+
+
+def test_a_path_of_the_tool(here: Here, tmp_path: Path) -> None:
+    beyond = {"position": [9.0, 0.0, 0.0], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+    reached = beyond | {"position": [0.4, -0.2, 0.3]}
+    body = {"t": [0.0, 1.0], "poses": [reached, beyond], "guess": HOME}
+    answer = written(here, tmp_path, "ik-path", "-", stdin=json.dumps(body))
+    assert ik.path_summary(answer) == {"in the trajectory": "1 of 2 points", "unreachable": "1"}
 
 
 def test_configurations_of_a_pose(here: Here, tmp_path: Path) -> None:
