@@ -61,12 +61,13 @@ def _page(slug: str) -> str:
     example = orjson.dumps(orjson.loads(document), option=orjson.OPT_INDENT_2).decode()
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(kind.title)}</title>'
-        f"<style>{_STYLE}</style><h1>{escape(kind.title)}</h1>"
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<style>{_STYLE}</style><main><h1>{escape(kind.title)}</h1>"
         f"<p><code>{slug}</code>, HTTP status {kind.status}</p>"
         f"<p>{_text(occasion(kind))}</p><p>{_text(kind.remedy)}</p>"
         + (f"<h2>Fields of its own</h2><dl>{fields}</dl>" if fields else "")
-        + f"<h2>Example</h2><pre>{escape(example)}</pre>"
-        f'<p><a href="../help/reference/errors/#{slug}">All errors</a></p>'
+        + f'<h2>Example</h2><pre tabindex="0">{escape(example)}</pre>'
+        f'<p><a href="../help/reference/errors/#{slug}">All errors</a></p></main>'
     )
 
 

@@ -34,6 +34,17 @@ def test_a_page_is_shown_and_can_be_read_by_everybody(
     assert findings(page) == []
 
 
+def test_pages_without_a_theme_can_be_read_by_everybody(browser: Browser, service: Server) -> None:
+    """Swagger UI itself puts links into buttons, and lets examples scroll that no key reaches."""
+    for path in (path_of(UnreachablePose), "/docs"):
+        with opened(browser, service.url + path) as page:
+            expect(page.get_by_role("main").get_by_role("heading").first).to_be_visible()
+            found = [name.partition(":")[0] for name in findings(page)]
+            assert found == (["nested-interactive"] if path == "/docs" else [])
+    with opened(browser, f"{service.url}/help/reference/cycle/", color_scheme="dark") as page:
+        assert findings(page) == []
+
+
 def test_the_search_finds_a_page_and_opens_it(page: Page, service: Server) -> None:
     page.goto(f"{service.url}/help/")
     page.get_by_role("button", name="Search").first.click()
