@@ -70,12 +70,13 @@ def test_its_own_duration_as_a_fixed_one_gives_the_same_energy(index: int) -> No
     assert energy(solved(body, duration=free.duration)) == pytest.approx(energy(free), rel=AGREED)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "index",
     [
         pytest.param(73, id="a stretched wrist"),
-        pytest.param(3, id="a redundant arm", marks=pytest.mark.long),
-        pytest.param(7, id="two near branches", marks=pytest.mark.long),
+        pytest.param(3, id="a redundant arm"),
+        pytest.param(7, id="two near branches"),
     ],
 )
 def test_a_cycle_of_one_stop_gives_the_same_energy(index: int) -> None:

@@ -100,7 +100,7 @@ def test_a_urdf_that_holds_too_much_is_refused_at_once(name: str) -> None:
     """Such a file of the size of a request's body once took seconds to minutes, or the worker."""
     make, words = DOCUMENTS[name]
     with pytest.raises(InvalidArm, match=words) as found:
-        own_figures("mine", changed(urdf=make(300_000)))
+        own_figures("mine", changed(urdf=make(210_000)))
     assert found.value.field == "urdf" and len(str(found.value)) < 500
 
 

@@ -77,6 +77,7 @@ def test_a_tool_that_may_turn_follows_what_no_other_can(crossed: Solution) -> No
         assert max(error) < 1e-6, "at its ends the tool has its full pose"
 
 
+@pytest.mark.long
 def test_the_certificate_allows_turns_about_this_axis_alone(crossed: Solution) -> None:
     ratios = {}
     for about in (None, Z, (1.0, 0.0, 0.0), (0.02, 0.0, 1.0)):

@@ -18,6 +18,7 @@ from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_problems import refused
 from tests.app.test_openapi_examples import DOCUMENT
 from tests.optimizer.export.read_back.urscript_machine import Controller
+from tests.selection import long_but
 
 Json = dict[str, Any]
 LOAD = {"mass": 2.0, "com": [0.0, 0.0, 0.05]}
@@ -53,6 +54,10 @@ def export(client: TestClient, format: str, answer: Any, **fields: Any) -> Any:
     return client.post(f"/export/{format}", json={"answer": answer, **fields})
 
 
+SLOW = {"joint_limits", "mcap"}
+"""Formats that take seconds, and have tests of their own."""
+
+
 def altered(answer: Json, *path: Any, value: Any) -> Json:
     changed = copy.deepcopy(answer)
     *outer, last = path
@@ -63,7 +68,7 @@ def altered(answer: Json, *path: Any, value: Any) -> Json:
     return changed
 
 
-@pytest.mark.parametrize("format", list(FORMATS))
+@pytest.mark.parametrize("format", long_but(FORMATS.keys() - SLOW, FORMATS))
 def test_a_kept_answer_is_exported_as_it_is_when_sent_whole(
     client: TestClient, answer: Json, format: str
 ) -> None:

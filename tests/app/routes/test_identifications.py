@@ -223,8 +223,10 @@ def test_identifications_are_listed(client: TestClient, log: str) -> None:
 @pytest.mark.parametrize(
     ("moves", "options", "body", "problem"),
     [
-        (1, {}, {}, NothingHeldOut),
-        (2, {"without": "P"}, {"fit": ["power"]}, NoPowerChannel),
+        pytest.param(1, {}, {}, NothingHeldOut, marks=pytest.mark.long),
+        pytest.param(
+            2, {"without": "P"}, {"fit": ["power"]}, NoPowerChannel, marks=pytest.mark.long
+        ),
         (4, {"without": "iP"}, {}, NotExcited),
     ],
 )
@@ -264,7 +266,9 @@ def test_methods_are_asked_for_by_name(client: TestClient, log: str, method: str
     assert whole.figures is not None
 
 
-@pytest.mark.parametrize("method", ["periodic", "base_wrench", "temperature"])
+@pytest.mark.parametrize(
+    "method", long_but(["periodic"], ["periodic", "base_wrench", "temperature"])
+)
 def test_a_method_that_the_log_does_not_fit_is_a_problem(
     client: TestClient, log: str, method: str
 ) -> None:

@@ -124,6 +124,7 @@ def test_equations_of_joints_that_keep_other_terms_are_those_without_their_torqu
         np.testing.assert_allclose(found.moment, direct.moment, rtol=0, atol=1e-12 * len(values))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "options",
     long_but(
@@ -140,6 +141,7 @@ def test_figures_beside_earlier_ones_are_written_as_fitted(options: dict[str, An
     check(identify(written(first), [log], IdentificationOptions(held_out=0.0, **options)), log)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "still"),
     long_but(
@@ -168,7 +170,8 @@ def test_methods_without_links_write_the_other_figures_as_they_were_fitted(
     assert energy.electrical.total == pytest.approx(arm.energy(rows), rel=2e-3)
 
 
-@pytest.mark.parametrize("terms", [pytest.param(DEFAULT_TERMS, marks=pytest.mark.long), CURVED])
+@pytest.mark.long
+@pytest.mark.parametrize("terms", [DEFAULT_TERMS, CURVED])
 def test_figures_of_power_beside_torques_behind_the_gears_are_written_as_they_were_fitted(
     terms: tuple[Term, ...],
 ) -> None:

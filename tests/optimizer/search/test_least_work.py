@@ -20,7 +20,6 @@ from joulepath.optimizer.search.run import Run
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, START, fixed, problem, tcp_pose
 from tests.optimizer.search.runs import prepared
-from tests.selection import long_but
 
 DURATION = 3.0
 # relative difference between local optima of two searches
@@ -48,7 +47,8 @@ def rough_work(own: Run) -> CoarseSolver:
     return CoarseSolver(own.state.prepared, DURATION)
 
 
-@pytest.mark.parametrize("collisions", long_but([True], [False, True]))
+@pytest.mark.long
+@pytest.mark.parametrize("collisions", [False, True])
 def test_what_becomes_of_the_candidates(collisions: bool) -> None:
     found = answer(collisions)
     work = found.energy.mechanical.total
