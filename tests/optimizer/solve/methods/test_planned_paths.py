@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from joulepath import AnyOf, optimize
-from joulepath.optimizer.collision.planner.joint_path import path_samples
+from joulepath.optimizer.collision.planner.joint_path import path_length, path_samples
 from joulepath.optimizer.collision.planner.path_planner import USUAL_EFFORT, Effort, plan_paths
 from joulepath.optimizer.collision.planner.planning_result import PlannedPaths, PlanningEnd
 from joulepath.optimizer.deadline import NEVER, Deadline
@@ -78,7 +78,25 @@ def test_more_paths_are_planned_for_the_only_candidate(
     monkeypatch.setattr(Surroundings, "planned_paths", noted)
     beside = [q_goal + 0.01 * k for k in range(goals)]
     optimize(replace(asked, goal=AnyOf(beside) if goals > 1 else q_goal))
-    assert efforts and {each.paths for each in efforts} == {4 if goals == 1 else 2}
+    sole = planned_paths.PLANNED_PATHS.effort_of_sole
+    assert efforts and {each.paths for each in efforts} == {sole.paths if goals == 1 else 2}
+
+
+def test_the_shortest_of_many_paths_are_followed() -> None:
+    """A longer search finds shorter ways around the post, and three of them are followed."""
+    arm, q_start, q_goal = task("post")
+    prepared, v_max = PreparedProblem.of(problem(arm, q_start, q_goal)), arm.active_limits.v_max
+    method = FreeSpline(SolveContext.of(prepared, q_start, q_goal, NEVER))
+    few, many = (
+        plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), replace(effort, easy=0))
+        for effort in (Effort(paths=2), planned_paths.PLANNED_PATHS.effort_of_sole)
+    )
+    followed = planned_paths.to_goal(method, many)
+    lengths = [path_length(path, v_max) for path in followed]
+    assert len(many.paths) > len(followed) == planned_paths.PLANNED_PATHS.most_followed
+    assert lengths == sorted(lengths)
+    assert lengths[0] <= min(path_length(path, v_max) for path in few.paths)
+    assert lengths[-1] <= planned_paths.PLANNED_PATHS.detour * lengths[0]
 
 
 def test_a_solve_among_obstacles_ends_once_it_cannot_come_near_the_best_motion() -> None:
