@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import shutil
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -37,6 +38,7 @@ FITTED = (
 FRICTION = ("knee",)
 LOGGED = ("robot", "units", "effort", "current_units", "torque_side", "columns")
 """Fields of requests that are options of the same names."""
+LOG = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 
 class _Validation(click.ParamType[Any, Any]):
@@ -48,15 +50,11 @@ class _Validation(click.ParamType[Any, Any]):
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> Path | float | str:
         """The path of a file, the fraction, or `moves`."""
-        if Path(value).is_file():
-            return Path(value)
         if value == "moves":
             return "moves"
-        try:
+        with suppress(ValueError):
             return float(value)
-        except ValueError:
-            hint = "name a file, a fraction as 0.3, or moves."
-            self.fail(f"{value!r} is no file: {hint}", param, ctx)
+        return LOG.convert(value, param, ctx)
 
 
 def _fields() -> Fields:
@@ -77,9 +75,7 @@ Examples:
   joulepath identify monday.csv --validate friday.csv --format moves
   joulepath identify excitation.csv --method periodic --period 10 --validate friday.csv""",
 )
-@click.argument(
-    "logs", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path)
-)
+@click.argument("logs", nargs=-1, required=True, type=LOG)
 @OUTPUT
 @click.option(
     "--validate",

@@ -145,7 +145,7 @@ def test_each_motion_validates_the_others(here: Here, logs: list[str], tmp_path:
     assert RESULT.model_validate_json(output.read_bytes()).validation.moves == 3
     assert here.run("identify", logs[1], "--validate", "moves", "--validate", logs[0])[0] == 2
     code, _, told = here.run("identify", logs[1], "--validate", "no_such.csv")
-    assert code == 2 and b"is no file" in told
+    assert code == 2 and b"does not exist" in told
 
 
 def _flag(name: str) -> str:
