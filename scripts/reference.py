@@ -1,5 +1,7 @@
-"""Writes two pages from the OpenAPI document of the service: `docs/reference/fields.md` on requests
-and answers, and `docs/reference/errors.md` on problems.
+"""Writes two pages from the OpenAPI document of the service, `docs/reference/fields.md` on requests
+and answers and `docs/reference/errors.md` on problems, and the tables of fields on other pages:
+those between `<!-- fields of NAME -->`, with names of fields behind a colon if not all are meant,
+and `<!-- end of fields -->`.
 
     python -m scripts.reference
 """
@@ -8,7 +10,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +36,9 @@ written by `python -m scripts.reference`.
 _RANGES = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
 _COMMON = {"type", "title", "status", "detail", "instance"}
 """Fields of all problems."""
+_TABLE = re.compile(
+    r"(<!-- fields of (\w+)(?:: ([\w ]+))? -->\n\n).*?(<!-- end of fields -->)", re.DOTALL
+)
 _LENGTHS = {"minItems": "at least", "maxItems": "at most"}
 
 
@@ -54,6 +59,24 @@ def errors(document: dict[str, Any]) -> str:
     """The page of problems."""
     problems = [schema for schema in document["components"]["schemas"].values() if _slug(schema)]
     return "\n".join([ERRORS_HEAD, *(_problem(schema) for schema in sorted(problems, key=_slug))])
+
+
+def with_tables(text: str, document: dict[str, Any]) -> str:
+    """The text of a page with its tables of fields renewed."""
+    schemas = document["components"]["schemas"]
+
+    def renewed(found: re.Match[str]) -> str:
+        begin, name, names, end = found.groups()
+        return f"{begin}{_rows(schemas[name], PAGE.name, (names or '').split())}\n\n{end}"
+
+    return _TABLE.sub(renewed, text)
+
+
+def pages(document: dict[str, Any]) -> dict[Path, str]:
+    """All pages that this module writes, with their texts."""
+    others = [page for page in FOLDER.glob("*.md") if page not in (PAGE, ERRORS)]
+    tables = {page: with_tables(page.read_text(encoding="utf-8"), document) for page in others}
+    return {PAGE: reference(document), ERRORS: errors(document), **tables}
 
 
 def _operation(method: str, path: str, operation: dict[str, Any], schemas: dict[str, Any]) -> str:
@@ -104,29 +127,24 @@ def _problem(schema: dict[str, Any]) -> str:
 
 
 def _table(name: str, schema: dict[str, Any]) -> str:
-    required = set(schema.get("required", ()))
-    rows, group = list[str](), ""
-    for field, node in schema.get("properties", {}).items():
-        if node.get("x-group", "") != group:
-            group = node["x-group"]
-            rows.append(f"| **{group}** | | |")
-        kind = f"{_type(node)}{_limits(field, node, required)}"
-        rows.append(f"| `{field}` | {kind} | {_cell(node.get('description', ''))} |")
     text = _cell(schema.get("description", ""))
     if "properties" not in schema:
         return "\n".join([f"### {name}", "", text, "", f"{_type(schema)}.", ""])
-    return "\n".join(
-        [
-            f"### {name}",
-            "",
-            text,
-            "",
-            "| field | type | meaning |",
-            "| --- | --- | --- |",
-            *rows,
-            "",
-        ]
-    )
+    return "\n".join([f"### {name}", "", text, "", _rows(schema), ""])
+
+
+def _rows(schema: dict[str, Any], page: str = "", names: Sequence[str] = ()) -> str:
+    """The table of the fields with these names, or of all, with links to tables on a page."""
+    required = set(schema.get("required", ()))
+    rows, group = ["| field | type | meaning |", "| --- | --- | --- |"], ""
+    for field in names or schema["properties"]:
+        node = schema["properties"][field]
+        if not names and node.get("x-group", "") != group:
+            group = node["x-group"]
+            rows.append(f"| **{group}** | | |")
+        kind = f"{_type(node, page)}{_limits(field, node, required)}"
+        rows.append(f"| `{field}` | {kind} | {_cell(node.get('description', ''))} |")
+    return "\n".join(rows)
 
 
 def _type(node: dict[str, Any], page: str = "") -> str:
@@ -173,6 +191,5 @@ def _cell(text: str) -> str:
 
 
 if __name__ == "__main__":
-    opened = create_app(Settings()).openapi()
-    PAGE.write_text(reference(opened), encoding="utf-8")
-    ERRORS.write_text(errors(opened), encoding="utf-8")
+    for path, text in pages(create_app(Settings()).openapi()).items():
+        path.write_text(text, encoding="utf-8")

@@ -7,13 +7,12 @@ from pathlib import Path
 
 from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.models.own_arm.description import Collision, Description, Drives, Electronics
-from scripts.reference import ERRORS, PAGE, errors, reference
+from scripts.reference import ERRORS, pages
 from tests.app.documents import open_document
 
 
 def test_the_pages_are_current() -> None:
-    document = open_document()
-    for page, made in ((PAGE, reference(document)), (ERRORS, errors(document))):
+    for page, made in pages(open_document()).items():
         assert page.read_text(encoding="utf-8") == made, "run `python -m scripts.reference`"
 
 

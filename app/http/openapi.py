@@ -36,6 +36,8 @@ from joulepath.app.settings import Settings
 from joulepath.optimizer.exceptions import DeclaredError
 
 _SECURITY = "apiKey"
+_OF_JOBS = ("IdentifyRequest",)
+"""Requests that are always jobs, and have the longest deadline of these."""
 _REF = "#/components/schemas/{model}"
 
 
@@ -145,10 +147,11 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
     _add_access(document, with_keys)
     add_pages(document)
     add_groups(schemas)
-    for deadline in _deadlines(document):
-        deadline["maximum"] = settings.max_deadline
+    for name, deadline in _deadlines(document):
+        longest = settings.max_job_deadline if name in _OF_JOBS else settings.max_deadline
+        deadline["maximum"] = longest
         if "default" in deadline:
-            deadline["default"] = min(deadline["default"], settings.max_deadline)
+            deadline["default"] = min(deadline["default"], longest)
     rewrite_for_generators(document["paths"])
     rewrite_for_generators(schemas)
     return document
@@ -187,22 +190,24 @@ def _add_problem(responses: dict[str, Any], problem: type[DeclaredError]) -> Non
     responses[status] = _response([*known, problem])
 
 
-def _deadlines(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The number schemas of all `deadline` fields in bodies and queries."""
+def _deadlines(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The number schemas of all `deadline` fields in bodies and queries, with the name of the body
+    or the path of the query."""
     fields = [
-        schema.get("properties", {}).get("deadline")
-        for schema in document["components"]["schemas"].values()
+        (name, schema["properties"]["deadline"])
+        for name, schema in document["components"]["schemas"].items()
+        if "deadline" in schema.get("properties", {})
     ]
-    for path in document["paths"].values():
-        for operation in path.values():
+    for path, operations in document["paths"].items():
+        for operation in operations.values():
             parameters = operation.get("parameters", ())
             fields += [
-                _schema_of(parameter) for parameter in parameters if parameter["name"] == "deadline"
+                (path, _schema_of(each)) for each in parameters if each["name"] == "deadline"
             ]
-    for field in filter(None, fields):
-        yield from (
-            option for option in field.get("anyOf", [field]) if option.get("type") == "number"
-        )
+    for name, field in fields:
+        for option in field.get("anyOf", [field]):
+            if option.get("type") == "number":
+                yield name, option
 
 
 def _schema_of(parameter: dict[str, Any]) -> dict[str, Any]:

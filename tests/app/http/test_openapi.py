@@ -134,7 +134,9 @@ def test_no_error_model_of_the_framework_is_left(document: dict[str, Any]) -> No
 
 @pytest.mark.long
 def test_every_deadline_is_the_services() -> None:
-    document = create_app(Settings(max_deadline=7.5)).openapi()
+    document = create_app(Settings(max_deadline=7.5, max_job_deadline=9.5)).openapi()
+    fit = document["components"]["schemas"]["IdentifyRequest"]["properties"].pop("deadline")
+    assert (fit["maximum"], fit["default"]) == (9.5, 9.5), "a fit is always a job"
     bodies = {name: schema for name, schema in properties(document) if name.endswith(".deadline")}
     assert bodies.keys() >= {
         f"{kind}Request.deadline" for kind in ("Optimize", "Compare", "Pareto", "Whatif")
