@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal
@@ -11,6 +12,12 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from joulepath.models.coupling import UNCOUPLED, Coupling
+from joulepath.models.immutable import (
+    ReadOnlyArrays,
+    ReadOnlyDict,
+    read_only_document,
+    read_only_view,
+)
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -25,7 +32,7 @@ MOST_ROBOTS = 64
 
 
 @dataclass(frozen=True)
-class Limits:
+class Limits(ReadOnlyArrays):
     """Joint limits in SI units, arrays of shape (nq,).
 
     All limits are symmetric, except `q_min` and `q_max`. `tau_max` limits the torque of the motor
@@ -42,7 +49,7 @@ class Limits:
     @cached_property
     def rates(self) -> Array:
         """Limits on speed, acceleration and jerk, (3, nq)."""
-        return np.stack([self.v_max, self.a_max, self.j_max])
+        return read_only_view(np.stack([self.v_max, self.a_max, self.j_max]))
 
     def scaled(self, factors: Limits | float) -> Limits:
         """Limits with speed, acceleration, jerk and torque scaled, by one factor or per joint."""
@@ -62,7 +69,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class FrictionLaw:
+class FrictionLaw(ReadOnlyArrays):
     """Joint friction torque, odd in the speed v.
 
     tau_f = (coulomb + load · |tau_link|) · v / sqrt(v² + knee²) + curved · asinh(v / speed) +
@@ -122,7 +129,7 @@ class FrictionLaw:
 
 
 @dataclass(frozen=True)
-class Drives:
+class Drives(ReadOnlyArrays):
     """Motor and gear of every joint, joint-side, shape (nq,) each.
 
     `torque_constant` [N·m/A], `rotor_inertia` [kg·m²], `copper` [W/A²], and the inverter's loss
@@ -175,7 +182,7 @@ class DefaultMotion:
 
 
 @dataclass(frozen=True)
-class LinkCapsule:
+class LinkCapsule(ReadOnlyArrays):
     """A capsule fixed to a link: ends of its axis (2, 3) [m] in the link frame, and radius [m].
 
     `link` is the number of the joint moving the link, 0 for the base.
@@ -187,7 +194,7 @@ class LinkCapsule:
 
 
 @dataclass(frozen=True, eq=False)
-class LinkHull:
+class LinkHull(ReadOnlyArrays):
     """The convex hull of `points` (n, 3) [m] in the frame of a link, grown by `radius` [m].
 
     `link` is the number of the joint moving the link, 0 for the base.
@@ -199,9 +206,9 @@ class LinkHull:
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
+class Robot(ReadOnlyArrays):
     """A robot arm: serial chain of revolute joints, world frame = `base`, last frame = `flange`.
-    Compared by identity.
+    Compared by identity. Robots are shared: none of their data can be changed.
 
     `model` has link inertias and rotor inertia (as armature); `loaded_model` adds payload and
     tilted gravity. `friction_laws` are named, and the first is the default. `figures` is the
@@ -227,7 +234,7 @@ class Robot:
     rated_payload: float
     drives: Drives
     electronics: Electronics
-    friction_laws: dict[str, FrictionLaw]
+    friction_laws: Mapping[str, FrictionLaw]
     default_motion: DefaultMotion | None
     capsules: tuple[LinkCapsule, ...]
     never_in_collision: frozenset[tuple[int, int]]
@@ -240,6 +247,11 @@ class Robot:
     gravity: Array = field(default_factory=lambda: UPRIGHT, repr=False)
     mains: Mains | None = None
     coupling: Coupling = UNCOUPLED
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "friction_laws", ReadOnlyDict(self.friction_laws))
+        object.__setattr__(self, "figures", read_only_document(self.figures))
 
     @cached_property
     def links_by_hulls(self) -> frozenset[int]:

@@ -10,6 +10,7 @@ from typing import Annotated, Any, overload
 
 import numpy as np
 
+from joulepath.models.immutable import ReadOnlyArrays
 from joulepath.models.robot import Robot
 from joulepath.optimizer.collision.model import ClosestPair, collision_model
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
@@ -34,7 +35,7 @@ number of branches of a full pose."""
 
 
 @dataclass(frozen=True, eq=False)
-class IKSolution:
+class IKSolution(ReadOnlyArrays):
     """One arm configuration of the pose."""
 
     label: str
@@ -60,6 +61,7 @@ class IKSolution:
     """The two bodies with the smallest clearance. Null if the arm has no shapes to compare."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         collides = self.nearest is not None and self.nearest.distance < 0
         object.__setattr__(self, "collides", collides)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+from joulepath.models.immutable import ReadOnlyArrays
 from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Axes, Count, Internal, PerJoint, Ratio, Seconds, Unit
 from joulepath.optimizer.result.certificate import Certificate
@@ -15,7 +16,7 @@ Coefficients = Annotated[Array, Axes(("joint", "harmonic")), Unit("rad/s")]
 
 
 @dataclass(frozen=True)
-class Series:
+class Series(ReadOnlyArrays):
     """The Fourier series of every joint: q = centre + Σ_k a_k sin(kωt) / (kω) - b_k cos(kωt) /
     (kω), ω = 2π / period. `a` and `b` have one row per joint."""
 

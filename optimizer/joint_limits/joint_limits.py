@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import yaml
 
+from joulepath.models.immutable import ReadOnlyArrays
 from joulepath.models.robot import Array, Limits, Robot
 from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
 from joulepath.optimizer.exceptions import InvalidProblem
@@ -53,7 +54,7 @@ SEARCH = SearchSettings()
 
 
 @dataclass(frozen=True)
-class JointLimits:
+class JointLimits(ReadOnlyArrays):
     """Limits of joints within which no torque exceeds its limit.
 
     Attributes:

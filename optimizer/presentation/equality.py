@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from joulepath.models.immutable import ReadOnlyArrays
 from joulepath.models.robot import Robot
 
 
-class Comparable:
-    """Base of dataclasses with arrays: equal if all their fields are, number by number.
+class Comparable(ReadOnlyArrays):
+    """Base of dataclasses with read-only arrays: equal if all fields are, number by number.
 
     Such a dataclass is declared with `eq=False`. Its values cannot be keys of a dictionary.
     """

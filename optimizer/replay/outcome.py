@@ -7,6 +7,7 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 
+from joulepath.models.immutable import ReadOnlyArrays
 from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Internal, Joules, Metres, PerJoint, Ratio, Unit
 from joulepath.optimizer.dynamics.limited_torque import limited_torque
@@ -38,7 +39,7 @@ OUTCOME = OutcomeSettings()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class Outcome(ReadOnlyArrays):
     """The motion of the simulated arm. Lists have one number per joint, from base to flange."""
 
     electrical: Joules = field(init=False)
@@ -71,6 +72,7 @@ class Outcome:
     """Energy of the motion as it went, without waiting afterwards."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         contact, energy = self.contact, self.energy
         collides = contact is not None and contact.depth > min(self.tcp_error, OUTCOME.max_touch)
         object.__setattr__(self, "electrical", energy.electrical.total)

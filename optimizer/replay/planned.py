@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from joulepath.models.immutable import ReadOnlyArrays
 from joulepath.models.robot import Array
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.replay.reference import Course
@@ -13,7 +14,7 @@ from joulepath.optimizer.result.energy import Objective
 
 
 @dataclass(frozen=True)
-class PlannedTorques:
+class PlannedTorques(ReadOnlyArrays):
     """Samples of an answer: q [rad], v [rad/s], a [rad/s²], all of shape (k, nq)."""
 
     q: Array

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
+from joulepath.models.immutable import ReadOnlyArrays
 from joulepath.optimizer.declared import Internal, Joules, NotEmpty, PerJoint, Ratio, Seconds, Unit
 from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.replay.controller import ControlName
@@ -69,7 +70,7 @@ class SavingRange:
 
 
 @dataclass(frozen=True)
-class AsPlanned:
+class AsPlanned(ReadOnlyArrays):
     """Energy of the motion in the answer, without waiting at the goal, and the use of its torque
     limits.
     """

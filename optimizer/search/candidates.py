@@ -10,6 +10,7 @@ from enum import Enum
 
 import numpy as np
 
+from joulepath.models.immutable import read_only_view
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.bounds.lower_bound import bound_through_passes, lower_bounds
 from joulepath.optimizer.bounds.mechanical_bound import mechanical_bounds
@@ -159,8 +160,8 @@ class Candidate:
             start_target=self.start.target,
             goal=self.goal.label,
             goal_target=self.goal.target,
-            q_start=self.q_start,
-            q_goal=self.q_goal,
+            q_start=read_only_view(self.q_start),
+            q_goal=read_only_view(self.q_goal),
             status=self.status,
             reason=self.message,
             lower_bound=self.lower_bound,
