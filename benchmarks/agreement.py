@@ -29,9 +29,9 @@ from joulepath.app.api.cycle.task import CycleTask
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.problem.robots import load_robot
 
 Json = dict[str, Any]
 

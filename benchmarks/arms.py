@@ -31,8 +31,9 @@ from benchmarks.requests import Outcome, send_all
 from benchmarks.service import Service, running
 from benchmarks.statistics import Spread
 from benchmarks.tasks import Kind, request_tasks
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import robot_names
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
+from joulepath.optimizer.problem.robots import load_robot
 
 KIND: Kind = "joint to pose"
 

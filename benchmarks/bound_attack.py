@@ -23,7 +23,6 @@ from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.reference import perturbation
 from benchmarks.statistics import Spread
 from benchmarks.tasks import MOUNTS
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
@@ -40,6 +39,7 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.ends import label_of
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline

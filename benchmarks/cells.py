@@ -14,7 +14,6 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import CollisionModel
@@ -24,6 +23,7 @@ from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.problem.scene import (
     Box,
     Capsule,

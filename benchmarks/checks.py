@@ -13,10 +13,10 @@ import pinocchio as pin
 
 from benchmarks.motion import SplineMotion, worst_ratios
 from benchmarks.tasks import flange
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Limits, Robot
 from joulepath.optimizer.problem.arm import LIMIT_NAMES, Arm, Payload
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.robots import load_robot
 
 # the documentation of `POST /optimize` promises the first three constants
 LARGEST_RATIO = 1 + 1e-6

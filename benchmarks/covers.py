@@ -30,10 +30,10 @@ from benchmarks.command import on_one_core, parser, write_json
 from joulepath.models.capsule_cover import LinkCover, not_held, outside, within_neighbours
 from joulepath.models.hull_parts import Inside, nowhere
 from joulepath.models.meshes import MESH_FILES, SHIFTS, installed, link_surfaces, sampled
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule, LinkHull
 from joulepath.models.tool_meshes import TOOL_MESHES, between, installed_tool, on_flange
 from joulepath.models.tools.registry import tool_figures
+from joulepath.optimizer.problem.robots import load_robot
 
 LARGEST_P99 = 3e-3
 """Limit on the 99th percentile of the excess of hulls over the surface of an arm or tool [m]."""

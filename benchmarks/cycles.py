@@ -39,7 +39,6 @@ import numpy as np
 from benchmarks.checks import gap_of
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.dynamics.plant import Plant
@@ -50,6 +49,7 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.free_order import FreeOrder
 from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.problem.stops import Stop
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])

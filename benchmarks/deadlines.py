@@ -30,9 +30,9 @@ from joulepath.app.engine.result import json_document
 from joulepath.app.engine.task import Task
 from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.optimize import warm_up
+from joulepath.optimizer.problem.robots import load_robot
 
 Fields = dict[str, Any]
 

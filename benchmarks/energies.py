@@ -26,7 +26,6 @@ from benchmarks.cells import cell_task
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.slow_moves import compare
 from benchmarks.tasks import collision_free, flange
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.exceptions import JoulepathError
@@ -34,6 +33,7 @@ from joulepath.optimizer.optimize import optimize, warm_up
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.robots import load_robot
 
 Kind = Literal["joint to joint", "joint to pose", "mechanical", "payload", "cell"]
 KINDS: tuple[Kind, ...] = ("joint to joint", "joint to pose", "mechanical", "payload", "cell")

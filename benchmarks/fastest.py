@@ -22,7 +22,6 @@ import numpy as np
 
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.linear_algebra import one_thread
@@ -31,6 +30,7 @@ from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.problem import DURATIONS, Problem
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.run import Run

@@ -34,10 +34,10 @@ from joulepath.app.convert.request import to_problem
 from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.meshes import link_surfaces
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.optimize import warm_up
+from joulepath.optimizer.problem.robots import load_robot
 
 Kind = Literal["joint", "pose"]
 KINDS: tuple[Kind, ...] = ("joint", "pose")

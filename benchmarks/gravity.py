@@ -23,10 +23,10 @@ from benchmarks.command import parser, write_json
 from benchmarks.gate import Gate
 from benchmarks.identification_logs import MISSING, folder, ur3e
 from benchmarks.public_logs import panda_by_inria, panda_by_unisa, ur10e_days
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.dynamics.link_regressor import rigid_torques
 from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.problem.robots import load_robot
 
 ROWS = 5000
 """Approximate largest number of compared rows per log."""

@@ -41,7 +41,6 @@ from benchmarks.identification_logs import MISSING, WRIST, folder, tx40, tx40_re
 from benchmarks.identification_outsider import outsider
 from benchmarks.identification_sessions import MOVE_EFFECT, cycles, sessions, ur10e_sessions
 from benchmarks.identification_standins import RATE, TORQUE_SENSOR, behind_the_gears, day_of, log_of
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.fits.block import moving_rows
@@ -53,6 +52,7 @@ from joulepath.optimizer.identify.quality.validation import torque_errors
 from joulepath.optimizer.identify.results import TorqueErrors
 from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import Truth, csv_of, off_the_model, recorded, truth_of
 
 UNITS = 4

@@ -12,12 +12,12 @@ import numpy as np
 from joulepath.models.own_arm.description import Description
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.robots import own_robot
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.reading import read_log
 from joulepath.optimizer.identify.options import Coupling
+from joulepath.optimizer.problem.robots import load_robot
 
 PLACE = "JOULEPATH_TEST_DATA"
 MISSING = f"{PLACE} does not name the folder of the real logs."

@@ -23,7 +23,6 @@ import numpy as np
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.identification_logs import MISSING, folder, ur3e
 from benchmarks.public_logs import panda_by_inria, ur10e_days
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.dynamics.link_regressor import base_wrench_regressor, body_parameters
 from joulepath.optimizer.exceptions import InvalidProblem, JoulepathError
@@ -31,6 +30,7 @@ from joulepath.optimizer.identify.choices import Method
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import recorded, truth_of
 
 METHODS: tuple[Method, ...] = get_args(Method)

@@ -15,7 +15,6 @@ import numpy as np
 
 from benchmarks.gate import Gate
 from benchmarks.public_logs import panda_by_inria, panda_by_unisa, ur10e_split
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.arm.fitted_arm import own_arm
 from joulepath.optimizer.identify.fits.by_method import prepare
@@ -23,6 +22,7 @@ from joulepath.optimizer.identify.fits.fitting import fit_rows
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
+from joulepath.optimizer.problem.robots import load_robot
 
 MOVING = 0.02
 """Smallest speed of a joint at which its errors count [rad/s]."""

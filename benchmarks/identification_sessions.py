@@ -14,10 +14,10 @@ import numpy as np
 from benchmarks.gate import GATED_RUNS, Gate, sampling_margin
 from benchmarks.identification_standins import day_of, log_of
 from benchmarks.public_logs import ur10e_days
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import WITHOUT_SPLIT, off_the_model, recorded, truth_of
 
 NUMBERS = (1, 2, 6)

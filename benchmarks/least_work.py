@@ -33,7 +33,6 @@ from benchmarks.statistics import Spread
 from joulepath import optimize
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.exceptions import JoulepathError
@@ -41,6 +40,7 @@ from joulepath.optimizer.motion.spline import Spline, lasting, sample
 from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import DURATIONS, Problem
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.problem.scene import Scene
 from joulepath.optimizer.search.errors import DurationTooShort
 

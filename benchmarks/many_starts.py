@@ -28,7 +28,6 @@ import numpy as np
 from benchmarks.command import on_one_core, parser, verdict
 from benchmarks.statistics import Spread
 from benchmarks.tasks import collision_free, flange
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.dynamics.plant import SMOOTHING
@@ -39,6 +38,7 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.search.attempts import improve
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.coarse_motions import COARSE, CoarseMotion, CoarseSolver

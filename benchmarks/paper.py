@@ -20,7 +20,6 @@ import pinocchio as pin
 from scipy.stats import spearmanr
 
 from joulepath import Problem, optimize
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.evaluate.evaluate import evaluate
 from joulepath.optimizer.evaluate.evaluation import Evaluation
@@ -28,6 +27,7 @@ from joulepath.optimizer.evaluate.recording import Waypoints
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.robots import load_robot
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "explained" / "paper.md"

@@ -31,7 +31,6 @@ from benchmarks.checks import gap_of
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.service import resident
 from benchmarks.statistics import Spread
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
@@ -47,6 +46,7 @@ from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.problem.scene import Box, HalfSpace, Obstacle, Scene
 from joulepath.optimizer.problem.stops import Stop
 

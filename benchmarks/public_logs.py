@@ -18,12 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.reading import read_log
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.robots import load_robot
 
 UR10E_DAYS: dict[str, tuple[str, ...]] = {
     "19_12_23": ("free",),

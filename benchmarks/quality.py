@@ -9,10 +9,10 @@ from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.reference import fingerprint, load, problem_of
 from benchmarks.statistics import Spread
 from benchmarks.tasks import move
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.robots import load_robot
 
 UNREACHED_DEADLINE = 600.0
 """Deadline that no search reaches, so that results do not depend on the machine [s]."""

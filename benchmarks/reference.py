@@ -27,7 +27,6 @@ import orjson
 from benchmarks.command import on_one_core, parser
 from benchmarks.planners.casadi_opti import CasadiOptiGrid
 from benchmarks.tasks import Move, move
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
@@ -36,6 +35,7 @@ from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.guess import Guess

@@ -25,12 +25,12 @@ from benchmarks.collision_replay import collisions
 from benchmarks.command import on_one_core, parser, verdict
 from benchmarks.statistics import Spread
 from joulepath import optimize
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import MethodName, Problem
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.solve.methods import METHODS
 from joulepath.optimizer.solve.methods.solve_result import MotionOrigin
 

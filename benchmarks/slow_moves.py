@@ -25,7 +25,6 @@ import numpy as np
 from benchmarks.command import write_json
 from benchmarks.statistics import Spread
 from benchmarks.tasks import move
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.exceptions import JoulepathError
@@ -36,6 +35,7 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.solve_context import SolveContext

@@ -17,7 +17,6 @@ import numpy as np
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from benchmarks.tasks import Move, moves
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.deadline import Deadline
@@ -26,6 +25,7 @@ from joulepath.optimizer.optimize import warm_up
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import MethodName, Problem
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.solve.methods import solver_for
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.solve_result import SolveResult

@@ -11,11 +11,11 @@ from typing import Any, Literal
 import numpy as np
 import pinocchio as pin
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.robots import load_robot
 
 Kind = Literal["joint to pose", "pose to pose"]
 KINDS: tuple[Kind, ...] = ("joint to pose", "pose to pose")

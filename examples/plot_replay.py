@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.replay.controller import command, gains
 from joulepath.optimizer.replay.play import play
 from joulepath.optimizer.replay.reference import course_of, reference

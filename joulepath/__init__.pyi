@@ -5,7 +5,7 @@ from .app.client.errors import ServiceUnreachable
 from .app.exceptions.base import InvalidRequest, ServiceError
 from .models.mjcf import mjcf
 from .models.own_arm.description import InvalidArm
-from .models.registry import load_robot, robot_names
+from .models.registry import robot_names
 from .models.robot import Limits, Robot
 from .models.tools.registry import tool_names
 from .models.uncertainty.document import InvalidFigures
@@ -95,6 +95,7 @@ from .optimizer.problem.free_order import FreeOrder
 from .optimizer.problem.line import Line
 from .optimizer.problem.pose import Pose
 from .optimizer.problem.problem import Problem
+from .optimizer.problem.robots import load_robot
 from .optimizer.problem.scene import (
     Attachment,
     Box,

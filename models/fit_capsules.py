@@ -25,7 +25,7 @@ from scipy.optimize import Bounds, minimize
 
 from joulepath.models.capsule_cover import not_held, outside
 from joulepath.models.meshes import link_surfaces, sampled
-from joulepath.models.registry import load_robot
+from joulepath.models.registry import bundled_robot
 from joulepath.models.robot import Array, LinkCapsule, Mask, Robot
 
 
@@ -291,7 +291,7 @@ def _about_z(angle: float) -> Array:
 
 def main() -> None:
     """Print the rows of the given links, or of all links."""
-    robot, folder = load_robot(sys.argv[1]), Path(sys.argv[2])
+    robot, folder = bundled_robot(sys.argv[1]), Path(sys.argv[2])
     for name in sys.argv[3:] or robot.link_names:
         print(f"  {name}:\n    value:")
         for capsule in fit(robot, folder, robot.link_names.index(name)):

@@ -20,7 +20,7 @@ from joulepath.models.capsule_cover import within_neighbours
 from joulepath.models.hull_cover import hull_around
 from joulepath.models.hull_parts import Rim, divided
 from joulepath.models.meshes import link_surfaces
-from joulepath.models.registry import load_robot
+from joulepath.models.registry import bundled_robot
 from joulepath.models.robot import LinkHull, Robot
 
 RIMS = {("gen3", "bracelet_link"): Rim(-0.0612, 6), ("iiwa14", "link_7"): Rim(0.0392, 4)}
@@ -42,7 +42,7 @@ def fitted_hulls(folder: Path, robot: Robot, link: int) -> list[LinkHull]:
 
 def main() -> None:
     """Print the rows of the given links, or of all moving links."""
-    robot, folder = load_robot(sys.argv[1]), Path(sys.argv[2])
+    robot, folder = bundled_robot(sys.argv[1]), Path(sys.argv[2])
     for name in sys.argv[3:] or robot.link_names[1:]:
         hulls = []
         for hull in fitted_hulls(folder, robot, robot.link_names.index(name)):

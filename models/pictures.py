@@ -17,7 +17,7 @@ import pinocchio as pin
 from scipy.spatial import cKDTree
 
 from joulepath.models.meshes import installed, mesh_file, mesh_placement
-from joulepath.models.registry import load_robot
+from joulepath.models.registry import bundled_robot
 from joulepath.models.robot import Array
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def picture(robot: str) -> bytes:
 
 
 def _links(robot: str) -> list[str]:
-    return ["base", *load_robot(robot).figures["kinematics"]["link_names"]["value"]]
+    return ["base", *bundled_robot(robot).figures["kinematics"]["link_names"]["value"]]
 
 
 def _parts(path: Path) -> list[tuple[Trimesh, Array]]:

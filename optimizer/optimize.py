@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.deadline import Clock
 from joulepath.optimizer.dynamics.kernel import kernel_for
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.progress import Tell, no_listener, only_news
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.run import Run

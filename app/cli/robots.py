@@ -170,8 +170,9 @@ def _robot(robot: str) -> Robot:
     from joulepath.app.store import robots as stored
     from joulepath.models.own_arm.description import InvalidArm
     from joulepath.models.own_arm.robots import own_robot
-    from joulepath.models.registry import DESCRIPTIONS, load_robot, robot_names
+    from joulepath.models.registry import robot_names
     from joulepath.optimizer.exceptions import InvalidProblem, UnknownRobot
+    from joulepath.optimizer.problem.robots import DESCRIPTIONS, load_robot
 
     try:
         if robot in robot_names() or robot.endswith(DESCRIPTIONS):
@@ -190,8 +191,9 @@ def _table() -> str:
     """Bundled robots, then added ones if the database answers."""
     from joulepath.app.exceptions.stored import StoreUnavailable
     from joulepath.app.store import robots as stored
-    from joulepath.models.registry import load_robot, robot_names
+    from joulepath.models.registry import robot_names
     from joulepath.models.trust import ENERGY_SECTIONS, trust_letters
+    from joulepath.optimizer.problem.robots import load_robot
 
     head = (
         "name",

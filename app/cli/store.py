@@ -65,7 +65,8 @@ def robot_named(name: str) -> Robot:
     Raises UnknownRobot; StoreUnavailable if the database is needed.
     """
     from joulepath.app.tasks.arm_engine import robot_in
-    from joulepath.models.registry import load_robot, robot_names
+    from joulepath.models.registry import robot_names
+    from joulepath.optimizer.problem.robots import load_robot
 
     return (
         load_robot(name) if name in robot_names() else in_store(lambda store: robot_in(store, name))

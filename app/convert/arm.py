@@ -15,7 +15,7 @@ from joulepath.app.convert.scene import to_attachment, to_scene
 from joulepath.app.convert.tool import to_tcp, to_tool, with_tool
 from joulepath.app.schemas import arm as asked
 from joulepath.app.schemas.arm import ArmRequest
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import robot_names
 from joulepath.models.robot import Array, Limits, Robot
 from joulepath.optimizer.exceptions import InvalidProblem, UnknownRobot
 from joulepath.optimizer.problem.arm import (
@@ -27,6 +27,7 @@ from joulepath.optimizer.problem.arm import (
 )
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.even_body import even_payload
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.problem.tool_cone import ToolCone
 
 

@@ -19,9 +19,10 @@ from joulepath.app.store import answers, figures, logs, robots
 from joulepath.app.store.store import Store
 from joulepath.app.tasks.job_document import JOBS, job_document
 from joulepath.app.tasks.kept_answers import answers_given
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import robot_names
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import UnknownRobot
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.progress import no_listener
 
 

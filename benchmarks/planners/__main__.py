@@ -14,9 +14,9 @@ from benchmarks.motion import Replay, replay
 from benchmarks.planners.planner import Planner, versions
 from benchmarks.statistics import Spread
 from benchmarks.tasks import Move, moves
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.robots import load_robot
 
 PLANNERS = {
     "answer": "joulepath:Answer",

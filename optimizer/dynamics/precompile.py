@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import sys
 
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import robot_names
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
+from joulepath.optimizer.problem.robots import load_robot
 
 if __name__ == "__main__":
     portable = "--portable" in sys.argv

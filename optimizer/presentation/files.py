@@ -20,7 +20,7 @@ from typing import Annotated, Any, Literal, Self, Union, get_args, get_origin
 import numpy as np
 
 from joulepath.models.from_figures import robot_of
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import bundled_robot, robot_names
 from joulepath.models.robot import Robot
 from joulepath.optimizer.presentation.declared_fields import hints_of, is_declared
 
@@ -170,6 +170,6 @@ def _array(hint: Any, data: Any) -> Any:
 
 def _robot(name: str, figures: dict[str, Any]) -> Robot:
     """The loaded robot of this name if its figures are the same, else a new one."""
-    if name in robot_names() and load_robot(name).figures == figures:
-        return load_robot(name)
+    if name in robot_names() and bundled_robot(name).figures == figures:
+        return bundled_robot(name)
     return robot_of(name, figures)

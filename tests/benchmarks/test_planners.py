@@ -16,8 +16,8 @@ from benchmarks.planners.casadi_opti import derivative_points
 from benchmarks.planners.planner import versions
 from benchmarks.side_by_side import Worker, measured
 from benchmarks.tasks import move
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.motion.bspline import DEGREE, uniform
+from joulepath.optimizer.problem.robots import load_robot
 from tests.optimizer.moves import problem_with
 from tests.selection import long_but
 

@@ -11,7 +11,7 @@ import pytest
 from benchmarks.energies import RELATIVE, differences
 from benchmarks.reference import fingerprint, load
 from benchmarks.requirements import Requirement, requirements
-from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.robots import load_robot
 
 ROW = {
     "index": 3,

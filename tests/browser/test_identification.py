@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.robots import load_robot
 from tests.app.live import ANSWER, CLIENT, Server
 from tests.browser.pages import SHOWN, ask, go, opened, state, until
 from tests.browser.test_reading import CONTRASTS, LEAST

@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from joulepath.app.schemas.examples.own_arm import ARM
-from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.robots import load_robot
 from tests.app.job_clients import evaluation
 from tests.app.live import ANSWER, CLIENT, Server
 from tests.browser.pages import SHOWN, go, opened, until

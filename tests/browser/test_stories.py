@@ -16,7 +16,7 @@ from joulepath.app.api.report.bundle import attached_to
 from joulepath.app.api.report.check import checked
 from joulepath.app.api.report.numbers import digits
 from joulepath.app.schemas.examples.own_arm import ARM
-from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.robots import load_robot
 from tests.app.live import ROOT, Server
 from tests.browser.pages import (
     FIRST,

@@ -9,8 +9,8 @@ import pytest
 
 from joulepath.models.capsule_cover import SMALLEST, not_held, outside
 from joulepath.models.meshes import KINDS, link_surfaces, sampled
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule, Robot
+from joulepath.optimizer.problem.robots import load_robot
 from tests.mesh_folders import FOUND, meshes
 from tests.selection import long_but
 

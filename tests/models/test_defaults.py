@@ -9,8 +9,9 @@ import pytest
 
 from joulepath.models.capsule_cover import outside
 from joulepath.models.meshes import link_surfaces
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import robot_names
 from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.problem.robots import load_robot
 from tests.mesh_folders import FOUND, meshes
 from tests.selection import ROBOTS
 

@@ -16,8 +16,8 @@ from joulepath.models.capsule_cover import outside
 from joulepath.models.form import link_bodies
 from joulepath.models.meshes import link_surfaces
 from joulepath.models.pictures import KIND, PICTURE, picture, picture_sources
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
+from joulepath.optimizer.problem.robots import load_robot
 from tests.mesh_folders import SHIPPED, meshes
 from tests.selection import ROBOTS, long_but
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from joulepath.models.fit_friction import FITS
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, FrictionLaw, Robot
+from joulepath.optimizer.problem.robots import load_robot
 from tests.selection import long_but
 
 # worst relative error over the table, promised to users

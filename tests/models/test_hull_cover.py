@@ -20,8 +20,9 @@ from joulepath.models.fit_hulls import fitted_hulls
 from joulepath.models.hull_cover import HULL_FIT, from_hull, hull_around
 from joulepath.models.hull_parts import PARTS, Rim, below, divided, nowhere
 from joulepath.models.meshes import KINDS, link_surfaces, sampled
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import robot_names
 from joulepath.models.robot import Array, LinkHull, Mask
+from joulepath.optimizer.problem.robots import load_robot
 from tests.mesh_folders import FOUND, meshes
 from tests.selection import long_but
 

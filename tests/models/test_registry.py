@@ -15,10 +15,12 @@ import pinocchio as pin
 import pytest
 
 from joulepath.models import registry
-from joulepath.models.registry import load_figures, load_robot, robot_names
+from joulepath.models.registry import load_figures, robot_names
 from joulepath.models.robot import Array, Robot
 from joulepath.models.trust import energy_trust
 from joulepath.models.urdf import urdf_of
+from joulepath.optimizer.exceptions import UnknownRobot
+from joulepath.optimizer.problem.robots import load_robot
 from tests.by_pinocchio import flange
 from tests.mesh_folders import SHIPPED
 from tests.mesh_folders import meshes as arm_folder
@@ -134,8 +136,9 @@ def test_names_load_and_others_do_not() -> None:
         robot_names()
     ) == sorted(robot_names())
     assert load_robot("ur5e") is load_robot("ur5e")
-    with pytest.raises(LookupError, match="ur5e"):
+    with pytest.raises(UnknownRobot, match="ur5e") as error:
         load_robot("../ur5e")
+    assert error.value.known == list(robot_names())
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -247,7 +250,7 @@ def test_the_elbow_is_a_figure(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     figures = load_figures(robot.name)
     del figures["collision"]["elbow"]
     monkeypatch.setattr(registry, "load_figures", lambda _: figures)
-    assert registry._load_robot.__wrapped__(robot.name).elbow is None
+    assert registry._bundled_robot.__wrapped__(robot.name).elbow is None
 
 
 @pytest.mark.parametrize("part", ["joint_names", "joint_origin", "link_names"])
@@ -283,7 +286,7 @@ def test_a_folder_with_figures_is_a_robot(monkeypatch: pytest.MonkeyPatch, tmp_p
     monkeypatch.setattr(registry, "files", lambda _: tmp_path)
     assert registry.robot_names.__wrapped__() == ("other", "ur5e")
     monkeypatch.setattr(registry, "robot_names", registry.robot_names.__wrapped__)
-    assert registry._load_robot.__wrapped__("other").model.name == "other"
+    assert registry._bundled_robot.__wrapped__("other").model.name == "other"
 
 
 def test_the_sentence_on_energies_is_made_from_the_letters() -> None:

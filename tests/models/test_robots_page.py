@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from joulepath.models.registry import load_figures, load_robot, robot_names
+from joulepath.models.registry import load_figures, robot_names
 from joulepath.models.trust import worst_letter
+from joulepath.optimizer.problem.robots import load_robot
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "robots.md"
 

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import pytest
 from threadpoolctl import threadpool_limits
 
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
+from joulepath.optimizer.problem.robots import load_robot
 from tests.compilers import with_compiler
 
 

@@ -97,7 +97,7 @@ def test_robots_are_loaded_once_by_threads_that_come_at_once() -> None:
     code = (
         "import threading\n"
         "from concurrent.futures import ThreadPoolExecutor\n"
-        "from joulepath.models.registry import load_robot\n"
+        "from joulepath.optimizer.problem.robots import load_robot\n"
         "together = threading.Barrier(8)\n"
         "with ThreadPoolExecutor(8) as executor:\n"
         "    loaded = list(executor.map(lambda _: together.wait() < 8 and load_robot('ur5e'), "

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.robots import load_robot
 from tests.app.live import GRACE, serving
 from tests.identification_logs import csv_of, recorded, truth_of
 from tests.mesh_folders import meshes

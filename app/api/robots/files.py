@@ -25,10 +25,11 @@ from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import is_known
 from joulepath.app.store import robots
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import robot_names
 from joulepath.models.urdf import urdf_of
 from joulepath.optimizer.exceptions import DeadlineExceeded, UnknownRobot
 from joulepath.optimizer.joint_limits.errors import NoJointLimits
+from joulepath.optimizer.problem.robots import load_robot
 
 router = APIRouter(prefix="/robots", tags=["robots"])
 

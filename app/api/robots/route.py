@@ -37,12 +37,13 @@ from joulepath.app.store.tables import OwnRobot, now
 from joulepath.models.form import link_bodies
 from joulepath.models.own_arm.robots import own_robot
 from joulepath.models.pictures import picture_sources
-from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.registry import robot_names
 from joulepath.models.robot import FrictionLaw as Law
 from joulepath.models.trust import TRUST, energy_trust
 from joulepath.optimizer.collision.example_move import ExampleMove as Move
 from joulepath.optimizer.collision.example_move import example_move
 from joulepath.optimizer.exceptions import UnknownRobot
+from joulepath.optimizer.problem.robots import load_robot
 
 router = APIRouter(prefix="/robots", tags=["robots"], route_class=LargeBodyRoute)
 

@@ -13,7 +13,7 @@ from starlette.testclient import TestClient
 
 from joulepath.app.cli.rename import KINDS
 from joulepath.app.schemas.examples.own_arm import ARM
-from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.robots import load_robot
 from tests.app.cli.console import Here
 from tests.app.job_clients import evaluation, optimization
 from tests.app.requests import move

@@ -17,9 +17,9 @@ from joulepath.app.convert.scene import to_scene
 from joulepath.app.schemas.examples.values import MESH_FILE
 from joulepath.app.schemas.scene import Scene
 from joulepath.app.schemas.shapes import MOST_CELLS
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.problem.clouds import CLOUD_RANGES, Points, Voxels
+from joulepath.optimizer.problem.robots import load_robot
 from tests.refusals import refusal_of
 
 # a file in single precision cycles coordinates of a metre to this [m]

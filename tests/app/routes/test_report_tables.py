@@ -15,7 +15,7 @@ from joulepath.app.api.report.drawings import DRAWING, Course, Leg, Stop, drawn
 from joulepath.app.api.report.log_report import measured
 from joulepath.app.api.report.numbers import digits, percent
 from joulepath.app.tasks import job_document
-from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.robots import load_robot
 from tests.app import job_clients as jobs
 from tests.app.job_clients import evaluation, optimization
 from tests.app.requests import move

@@ -22,9 +22,9 @@ from joulepath.models.own_arm.capsule_around import SEARCH, capsule_around
 from joulepath.models.own_arm.description import Description, InvalidArm
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.mesh_files import in_folder, in_zip, surface
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule
 from joulepath.models.uploads.limits import LIMITS
+from joulepath.optimizer.problem.robots import load_robot
 from tests.mesh_folders import meshes as arm_folder
 from tests.models.own_arm.arms import PLAIN, RICH, RICH_ARM, URDF, changed, meshed, robot
 from tests.selection import long_but

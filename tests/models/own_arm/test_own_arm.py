@@ -22,12 +22,13 @@ from joulepath.models.own_arm.description import (
     Motion,
 )
 from joulepath.models.own_arm.figures import own_figures
-from joulepath.models.registry import load_figures, load_robot
+from joulepath.models.registry import load_figures
 from joulepath.models.robot import Array
 from joulepath.models.trust import energy_trust
 from joulepath.models.urdf import urdf_of
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
+from joulepath.optimizer.problem.robots import load_robot
 from tests.mesh_folders import meshes as arm_folder
 from tests.models.own_arm.arms import AMPLE, HELD, PLAIN, RICH, RICH_ARM, refused, robot, whole
 

@@ -12,8 +12,8 @@ from joulepath.models.own_arm.description import Description, InvalidArm
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.holding_torques import HoldingTorques
 from joulepath.models.own_arm.urdf_chain import chain_of
-from joulepath.models.registry import load_robot
 from joulepath.models.urdf import urdf_of
+from joulepath.optimizer.problem.robots import load_robot
 from tests.models.own_arm.arms import PLAIN, RICH, RICH_ARM, robot
 from tests.selection import ROBOTS
 

@@ -16,7 +16,7 @@ from joulepath.app.schemas.examples.own_arm import URDF
 from joulepath.models.from_figures import robot_of
 from joulepath.models.own_arm.description import Collision, Drives, Electronics, InvalidArm, Motion
 from joulepath.models.own_arm.figures import own_figures
-from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.robots import load_robot
 from tests.models.own_arm.arms import HELD, RICH, RICH_ARM, refused, robot
 from tests.selection import long_but
 

@@ -13,11 +13,11 @@ from joulepath.app.schemas.examples.figures import FIGURES
 from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.robots import own_robot
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.parameters import BASE_POWER, PER_JOINT, count, place, values
 from joulepath.models.uncertainty.ranges import default_ranges
 from joulepath.models.uncertainty.spread import DRAWS, spread_of
+from joulepath.optimizer.problem.robots import load_robot
 
 UR5E = load_robot("ur5e")
 EXACT = FIGURES | {

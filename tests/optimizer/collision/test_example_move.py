@@ -11,9 +11,9 @@ import pytest
 from joulepath.models.own_arm.description import Description
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.robots import own_robot
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule, Robot
 from joulepath.optimizer.collision.example_move import EXAMPLE, example_move
+from joulepath.optimizer.problem.robots import load_robot
 from tests.by_pinocchio import flange
 from tests.selection import ROBOTS
 

@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.inverse_dynamics import SymbolicPayload, inverse_dynamics
 from joulepath.optimizer.dynamics.torque_regressor import torque_regressor
+from joulepath.optimizer.problem.robots import load_robot
 from tests.optimizer.moves import ROBOT
 
 STATES = 1000

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.errors import (
@@ -22,6 +21,7 @@ from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.quality import validation as validation_module
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import (
     FAR,
     GRAVITY,

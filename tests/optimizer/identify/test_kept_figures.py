@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
 from joulepath.models.uncertainty.document import covariance_of
 from joulepath.optimizer.exceptions import JoulepathError
@@ -21,6 +20,7 @@ from joulepath.optimizer.identify.fits.torque_fit import by_held_values
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import WITHOUT_SPLIT, Noise, recorded, truth_of, written
 from tests.selection import long_but
 

@@ -8,7 +8,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.document import covariance_of
 from joulepath.models.uncertainty.parameters import LINKS
@@ -22,6 +21,7 @@ from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric, pse
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import recorded, torque_errors, truth_of
 from tests.impossible_links import with_impossible_link
 from tests.selection import ROBOTS

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from joulepath.models.from_figures import robot_of
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Mains, Robot
 from joulepath.models.uncertainty.document import InvalidFigures
 from joulepath.models.uncertainty.parameters import index
@@ -22,6 +21,7 @@ from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.dwell import Dwell
+from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import (
     WITHOUT_SPLIT,
     Truth,

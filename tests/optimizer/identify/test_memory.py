@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import Form, csv_of, recorded, truth_of
 
 ROOT = Path(__file__).parents[3]
@@ -27,7 +27,7 @@ def peak():
 SCRIPT = f"""{PEAK}
 from dataclasses import replace
 import numpy as np
-from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import LogMove
 from joulepath.optimizer.identify.options import IdentificationOptions
@@ -56,7 +56,7 @@ ROWS = 1_000_000
 FROM_FILE = f"""{PEAK}
 import sys
 from pathlib import Path
-from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.logs.reading import read_log

@@ -9,7 +9,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.link_regressor import (
     base_wrench_regressor,
@@ -25,6 +24,7 @@ from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import FAR, WITHOUT_SPLIT, Truth, recorded, torque_errors, truth_of
 
 ROBOT = load_robot("ur5e")

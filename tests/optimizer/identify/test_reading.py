@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.errors import EffortNotUsable, LogTooLarge
 from joulepath.optimizer.identify.logs.grid import grid_of
@@ -19,6 +18,7 @@ from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.reading import read_log
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import (
     SILENT,
     Form,

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.models.uncertainty.document import InvalidFigures
 from joulepath.models.uncertainty.parameters import place
@@ -22,6 +21,7 @@ from joulepath.optimizer.identify.estimates.grouped import (
 )
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.quality.interval import INTERVAL, own_variance, session_sd
+from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import WITHOUT_SPLIT, off_the_model, recorded, truth_of
 
 GROUPS, SIZE = 12, 30

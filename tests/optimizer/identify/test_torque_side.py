@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.errors import MethodNotApplicable
@@ -19,6 +18,7 @@ from joulepath.optimizer.identify.logs.recorded import measured
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.fit_rows import ROWS
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import (
     GRAVITY,
     SILENT,

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.dynamics.link_regressor import rigid_torques
 from joulepath.optimizer.dynamics.losses import breakdown
@@ -22,6 +21,7 @@ from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import (
     WITHOUT_SPLIT,
     Recording,

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.ik_solutions import PrincipalSolution
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.problem.robots import load_robot
 from tests.by_pinocchio import flange
 
 # largest pose error of a solution [m, rad]

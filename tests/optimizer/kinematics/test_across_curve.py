@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.kinematics.chain import Chain, pose_error, twist_size
 from joulepath.optimizer.kinematics.seven.across_curve import (
     ACROSS,
@@ -13,6 +12,7 @@ from joulepath.optimizer.kinematics.seven.across_curve import (
     second_order,
     step_across,
 )
+from joulepath.optimizer.problem.robots import load_robot
 from tests.optimizer.chains import serial_chain
 
 CHAINS = [Chain.of(load_robot("gen3").model), Chain.of(serial_chain(7).model)]

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
 from joulepath.optimizer.kinematics.chain import Chain
@@ -17,6 +16,7 @@ from joulepath.optimizer.kinematics.covers.branch_covers import (
     branch_covers,
 )
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
+from joulepath.optimizer.problem.robots import load_robot
 from tests.optimizer.chains import serial_chain
 from tests.selection import long_but
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.covers.pose_cells import PoseCells, pose_cells_of
 from joulepath.optimizer.kinematics.joint_axes import JointAxes
+from joulepath.optimizer.problem.robots import load_robot
 from tests.optimizer.kinematics.axis_patterns import redrawn, robot_of, shifted
 
 ROUNDING = 1e-9

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from benchmarks.tasks import flange
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.self_motion import SELF_MOTION, SelfMotion, spread
 from joulepath.optimizer.kinematics.self_motion_members import up_to_limits, without_gaps
+from joulepath.optimizer.problem.robots import load_robot
 
 # one turn of the first joint while the second stays within 0.003 rad of the stretched shoulder
 NEAR_SINGULAR = [0.57244, 0.00264, -2.87612, -1.45547, -0.40888, 2.9146, 0.92274]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.seven.traced_curve import TracedCurve
+from joulepath.optimizer.problem.robots import load_robot
 from tests.optimizer.chains import serial_chain
 
 GEN3 = load_robot("gen3")

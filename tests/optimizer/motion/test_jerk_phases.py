@@ -10,10 +10,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.motion import ruckig_motion
 from joulepath.optimizer.motion.ruckig_motion import time_optimal_positions, time_optimal_spline
 from joulepath.optimizer.motion.spline import least_time_scale, sample
+from joulepath.optimizer.problem.robots import load_robot
 from tests.selection import long_but
 
 NAMES = ("ur5e", "kr10_r1100", "panda")

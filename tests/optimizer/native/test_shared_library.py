@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
 from joulepath.optimizer.native import build
 from joulepath.optimizer.native.build import FOLDER, LIBRARY, BuildFailed, sources_digest
 from joulepath.optimizer.native.shared_library import LibraryUnusable, load
+from joulepath.optimizer.problem.robots import load_robot
 from tests.selection import ROBOTS
 
 pytestmark = pytest.mark.usefixtures("compiler")

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 
 ROBOT = load_robot("ur5e")
