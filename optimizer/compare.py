@@ -17,6 +17,7 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.presentation.chart import Chart
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.presentation.result import Result, Rows
+from joulepath.optimizer.problem.parts import checked_arguments
 from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.progress import (
     CandidatesFound,
@@ -144,6 +145,7 @@ def _cell(value: float | str | None) -> str:
     return "" if value is None else value if isinstance(value, str) else f"{value:.4g}"
 
 
+@checked_arguments
 def compare(
     problem: Problem,
     methods: Sequence[MethodName] = tuple(METHODS),

@@ -26,6 +26,7 @@ from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.presentation.result import Result, Rows, per_joint
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.parts import checked_arguments
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.search.ends import label_of
 
@@ -120,6 +121,7 @@ class IKSolutions(Result, Sequence[IKSolution]):
         return columns | per_joint("q", np.array([each.q for each in self]))
 
 
+@checked_arguments
 @one_thread()
 def inverse_kinematics(
     arm: Arm | Robot,

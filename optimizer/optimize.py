@@ -9,6 +9,7 @@ from joulepath.optimizer.dynamics.kernel import kernel_for
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.parts import checked_arguments
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.progress import Tell, no_listener, only_news
@@ -17,6 +18,7 @@ from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solve.methods import METHODS
 
 
+@checked_arguments
 def optimize(
     problem: Problem,
     clock: Clock = time.perf_counter,

@@ -28,6 +28,7 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoT
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.presentation.progress_bar import progress_bar
+from joulepath.optimizer.problem.parts import checked_arguments
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import (
     CandidatesFound,
@@ -68,6 +69,7 @@ class ParetoSettings:
 PARETO = ParetoSettings()
 
 
+@checked_arguments
 def pareto(
     problem: Problem,
     points: int = 12,
@@ -92,9 +94,9 @@ def pareto(
     Raises:
         JoulepathError: as `optimize`; InvalidProblem also for a fixed duration, or too many points.
     """
-    if not PARETO.least_points <= points <= PARETO.most_points:
-        allowed = f"between {PARETO.least_points} and {PARETO.most_points}"
-        raise InvalidProblem("points", f"points must lie {allowed}.")
+    least, most = PARETO.least_points, PARETO.most_points
+    if points not in range(least, most + 1):
+        raise InvalidProblem("points", f"points must be a whole number from {least} to {most}.")
     if problem.has_fixed_duration:
         raise InvalidProblem(
             "duration", "A front runs over durations: leave duration out or give a range."
@@ -314,9 +316,7 @@ class _Search:
 
     def result(self, shortest: float, complete: bool) -> Front:
         """The front without dominated nodes."""
-        points: list[Solution] = []
-        dropped: list[Dropped] = []
-        least = math.inf
+        points, dropped, least = list[Solution](), list[Dropped](), math.inf
         for node in self.nodes:
             if node.answer is None:
                 dropped.append(Dropped(node.duration, None, node.reason))

@@ -24,6 +24,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.presentation.chart import Chart
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.presentation.result import Result, Rows
+from joulepath.optimizer.problem.parts import checked_arguments
 from joulepath.optimizer.problem.problem import Problem, narrowed
 from joulepath.optimizer.progress import Tell, no_listener
 from joulepath.optimizer.result.certificate import Certificate
@@ -103,6 +104,7 @@ class WhatIf(Result):
         return self.reoptimised._charts() if self.reoptimised else ()
 
 
+@checked_arguments
 @one_thread()
 def what_if(
     solution: Solution,

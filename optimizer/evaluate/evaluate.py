@@ -36,12 +36,14 @@ from joulepath.optimizer.evaluate.piecewise_motion import (
 )
 from joulepath.optimizer.evaluate.recording import MOTION_LIMITS, Recording, Waypoints
 from joulepath.optimizer.evaluate.sampler import Sampler
-from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.quadrature import lobatto_panels
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.scalars import check_number
 from joulepath.optimizer.progress import Steps, TellSteps, no_listener
 from joulepath.optimizer.result.energy import (
     Energy,
@@ -65,6 +67,7 @@ class QuadratureSettings:
 QUADRATURE = QuadratureSettings()
 
 
+@checked_arguments
 @one_thread()
 def evaluate(
     arm: Arm,
@@ -100,14 +103,9 @@ def evaluate(
         InvalidTable: a row of the motion is wrong.
         DeadlineExceeded: the deadline passed first.
     """
+    check_number("sample_period", sample_period, "seconds", positive=True, optional=True)
     end = Deadline.after(deadline, clock)
     given = motion.trajectory.spline if isinstance(motion, Solution) else motion
-    if not isinstance(given, Waypoints | Recording | Spline):
-        raise InvalidProblem(
-            "motion",
-            f"motion must be a solution, Recording.of(t, q), or Waypoints(q, times), and is of "
-            f"type {type(given).__name__}.",
-        )
     evaluator = _Evaluator(arm, given, sample_period)
     try:
         with watch(end), progress_bar("Evaluating", tell, progress) as tell:

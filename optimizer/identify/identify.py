@@ -54,6 +54,7 @@ from joulepath.optimizer.presentation.declared_fields import shown_fields
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.presentation.result import Result
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.parts import checked_arguments
 from joulepath.optimizer.problem.uncoupled import check_uncoupled
 from joulepath.optimizer.progress import Steps, TellSteps, no_listener
 
@@ -178,6 +179,7 @@ def _cell(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
+@checked_arguments
 @one_thread()
 def identify(
     robot: Robot,

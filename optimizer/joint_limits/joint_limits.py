@@ -21,6 +21,7 @@ from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.presentation.equality import same
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.parts import checked_arguments
 from joulepath.optimizer.problem.uncoupled import check_uncoupled
 
 
@@ -101,6 +102,7 @@ class JointLimits(ReadOnlyArrays):
         return comment + yaml.safe_dump({"joint_limits": limits}, sort_keys=False)
 
 
+@checked_arguments
 def joint_limits(arm: Arm) -> JointLimits:
     """Limits on speed and acceleration that keep the torque limits in every posture of an arm.
 

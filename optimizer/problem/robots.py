@@ -10,7 +10,8 @@ import yaml
 
 from joulepath.models.registry import LOADER, bundled_robot, robot_names
 from joulepath.models.robot import Robot
-from joulepath.optimizer.exceptions import InvalidProblem, UnknownRobot
+from joulepath.optimizer.exceptions import UnknownRobot
+from joulepath.optimizer.problem.parts import check_type
 
 DESCRIPTIONS = (".yaml", ".yml")
 """File extensions of descriptions of own arms."""
@@ -41,17 +42,13 @@ def load_robot(
     """
     if figures is not None:
         return _identified(load_robot(robot), figures)
-    if isinstance(robot, PathLike) or (isinstance(robot, str) and robot.endswith(DESCRIPTIONS)):
+    check_type(robot, "robot", str, PathLike)
+    if isinstance(robot, PathLike) or robot.endswith(DESCRIPTIONS):
         from joulepath.models.own_arm.robots import (
             read_robot,  # importing its validator takes as long as the rest of this package
         )
 
         return read_robot(Path(robot))
-    if not isinstance(robot, str):
-        raise InvalidProblem(
-            "robot",
-            f"robot must be a name of robot_names() or a path, not {type(robot).__name__}.",
-        )
     if robot not in robot_names():
         raise UnknownRobot(robot, list(robot_names()))
     return bundled_robot(robot)
@@ -68,10 +65,7 @@ def _identified(robot: Robot, figures: str | PathLike[str] | dict[str, Any]) -> 
     from joulepath.models.own_arm.robots import own_robot  # as above
     from joulepath.models.uncertainty.document import with_document
 
-    if not isinstance(figures, dict | str | PathLike):
-        raise InvalidProblem(
-            "figures", f"figures must be a document or a path, not {type(figures).__name__}."
-        )
+    check_type(figures, "figures", dict, str, PathLike)
     document = figures if isinstance(figures, dict) else _read_document(Path(figures))
     return own_robot(robot.name, with_document(robot.name, robot.figures, document))
 

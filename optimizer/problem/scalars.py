@@ -87,7 +87,7 @@ def _described(unit: str, least: float, most: float, positive: bool) -> str:
         return f"a {number} {'above' if positive else 'from'} {least:g} to {most:g}"
     if positive:
         return f"a positive {number}"
-    return f"a {number}, {least:g} or more"
+    return f"a {number}, {least:g} or more" if np.isfinite(least) else f"a {number}"
 
 
 def check_text(field: str, value: object, pattern: str) -> None:

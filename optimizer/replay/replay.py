@@ -19,7 +19,9 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.parts import checked_arguments
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scalars import check_choice, check_number
 from joulepath.optimizer.progress import Steps, TellSteps, no_listener
 from joulepath.optimizer.replay.baseline_courses import ReportedBaseline, planned_baselines
 from joulepath.optimizer.replay.controller import ControlName, command, gains
@@ -79,6 +81,7 @@ def replay(
     tell: TellSteps = ...,
     progress: bool = ...,
 ) -> list[Replay]: ...
+@checked_arguments
 @one_thread()
 def replay(
     motion: Solution | CycleSolution | PlannedMotion,
@@ -118,6 +121,11 @@ def replay(
         NotCertified: the solution does not belong to the arm of the problem.
         DeadlineExceeded: the deadline passed first.
     """
+    check_number("step", step, "seconds", positive=True)
+    for control in controls:
+        check_choice("controls", control, ControlName)
+    for quantity in perturb or {}:
+        check_choice("perturb", quantity, Quantity)
     try:
         with (
             watch(Deadline.after(deadline, clock)),

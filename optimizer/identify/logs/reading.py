@@ -39,6 +39,7 @@ from joulepath.optimizer.identify.logs.moves import cut_into_moves, rests_by_com
 from joulepath.optimizer.identify.logs.speeds import speeds_of
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.arrays import frozen
+from joulepath.optimizer.problem.parts import checked_arguments
 
 
 @dataclass(frozen=True)
@@ -96,6 +97,7 @@ def check_header(source: Path | bytes, robot: Robot, options: LogOptions) -> Non
         columns_of_header(head_of(file).names, robot, options)
 
 
+@checked_arguments
 def read_log(
     source: str | PathLike[str] | bytes, robot: Robot, options: LogOptions | None = None
 ) -> LogReading:

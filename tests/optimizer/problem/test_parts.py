@@ -35,7 +35,7 @@ def arm(**fields: Any) -> Arm:
 @pytest.mark.parametrize(
     ("make", "fields", "said"),
     [
-        (problem, {"arm": ROBOT}, "arm must be of type Arm, not Robot."),
+        (problem, {"arm": ROBOT}, "arm must be of type Arm, not Robot: give Arm(robot="),
         (arm, {"robot": "ur5e"}, "robot must be of type Robot, not str: give load_robot(name)."),
         (arm, {"tool": "suction_cup"}, "tool.0 must be of type Attachment, not str: give load_t"),
         (arm, {"scene": [BOX]}, "scene must be of type Scene, not list."),
