@@ -46,6 +46,7 @@ def robot_of(name: str, figures: dict[str, Any]) -> Robot:
     return Robot(
         name=name,
         title=figures["title"],
+        maker=figures.get("maker"),
         model=model,
         limits=Limits(
             q_min=_joints(limits["position_min"], nq),

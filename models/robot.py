@@ -224,7 +224,7 @@ class Robot(ReadOnlyArrays):
     them. `T_base_base_link` (4, 4) is the pose of ROS's frame `base_link` in `base`. `gravity` (3,)
     [m/s²] is that in `base` unless an arm has another mounting. `mains` is None where nobody
     measured what the control box draws. `coupling` has the joints of the chain that follow others;
-    the others are the nq joints of the arm.
+    the others are the nq joints of the arm. `maker` is None for a user's own arm.
     """
 
     name: str
@@ -247,6 +247,7 @@ class Robot(ReadOnlyArrays):
     gravity: Array = field(default_factory=lambda: UPRIGHT, repr=False)
     mains: Mains | None = None
     coupling: Coupling = UNCOUPLED
+    maker: str | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

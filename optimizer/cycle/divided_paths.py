@@ -86,7 +86,7 @@ def _parts(cycle: Cycle, models: ModelsOfArms, k: int) -> list[Stop]:
     try:
         layers_of_stop(cycle, models, k)
     except PathInfeasible as error:
-        if error.path != f"stops/{stop.name}":
+        if error.is_line:
             raise
         places = _places(cycle, models, stop)
         if places is None:

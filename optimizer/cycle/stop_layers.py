@@ -135,8 +135,13 @@ def layers_of_stop(cycle: Cycle, models: ModelsOfArms, k: int) -> list[Layer]:
         follows = _nodes_that_follow(cycle, origin, found, blocked)
         if not (kept & follows).any():
             attempts = _attempts(cycle, origin, found, blocked, follows)
-            name, joints = layers[path.end].name, cycle.arm.robot.nq
-            raise PathInfeasible(length, attempts, name, joints=joints)
+            raise PathInfeasible(
+                length,
+                attempts,
+                layers[path.end].name,
+                is_line=path.line is not None,
+                joints=cycle.arm.robot.nq,
+            )
         kept &= follows
     several = stop.path is not None and stop.path.goals is not None
     if windings and (not cycle.windings or (several and kept.sum() > LEG.most_path_nodes)):

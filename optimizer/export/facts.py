@@ -83,16 +83,12 @@ def check_joints(program: Program, format: str, nq: int, maker: str, arms: str) 
             maker.
     """
     robot = program.robot
-    # arms of users' own have figures without a maker: their number of joints decides
-    known = next((each for each in _MAKERS if robot.title.startswith(each)), maker)
-    if robot.nq == nq and known == maker:
+    # users' own arms have no maker: their number of joints decides
+    if robot.nq == nq and robot.maker in (maker, None):
         return
-    has = f"{robot.nq} joints" if robot.nq != nq else f"a controller of {known}"
+    has = f"{robot.nq} joints" if robot.nq != nq else f"a controller of {robot.maker}"
     raise FormatUnsuitable(
         format,
         f"The format {format} is for {arms}, and this robot has {has}: use ros2, moveit, csv, json "
         "or npz.",
     )
-
-
-_MAKERS = ("Universal Robots", "Franka", "KUKA", "UFACTORY", "ABB")

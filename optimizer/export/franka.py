@@ -57,7 +57,7 @@ def to_franka(program: Program, options: FrankaOptions | None = None) -> Written
             too large.
     """
     options = options or FrankaOptions()
-    check_joints(program, "franka", 7, "Franka", "robots of Franka, with seven joints")
+    check_joints(program, "franka", 7, "Franka Robotics", "robots of Franka, with seven joints")
     if any(timed.payload is not None for timed in program.timed):
         raise FormatUnsuitable(
             "franka",

@@ -13,7 +13,7 @@ import numpy as np
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.dwell import Dwell, Hold
+from joulepath.optimizer.problem.dwell import Dwell, Hold, check_holding
 from joulepath.optimizer.problem.free_order import FreeOrder, check_order
 from joulepath.optimizer.problem.names import check_name, first_repeated
 from joulepath.optimizer.problem.parts import check_parts
@@ -151,7 +151,7 @@ class Cycle:
         if self.order is not None:
             check_order(self.order, self.stops, self.arm.payload)
         self._check_passes()
-        self._check_holding()
+        check_holding("hold", self.hold, self.brake_delay, self.brake_power)
         self._check_wait()
         self._check_duration()
 
@@ -246,14 +246,6 @@ class Cycle:
             raise InvalidProblem(
                 "wait", f"No move ends at a place named {self.wait!r}: give the name of a stop."
             )
-
-    def _check_holding(self) -> None:
-        try:
-            self.dwell_of(1.0)
-        except InvalidProblem as error:
-            raise InvalidProblem(
-                error.field.replace("dwell", "hold"), str(error).replace("dwell", "hold")
-            ) from None
 
     def _check_duration(self) -> None:
         for value in (self.duration_min, self.duration_max):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from joulepath.optimizer.problem.scalars import check_choices, check_number
+from joulepath.optimizer.problem.scalars import check_choice, check_number
 
 Hold = Literal["motors", "brakes"]
 
@@ -32,6 +32,15 @@ class Dwell:
 
     def __post_init__(self) -> None:
         check_number("dwell.time", self.time, "seconds", positive=True)
-        check_choices(self, "dwell.")
-        check_number("dwell.brake_delay", self.brake_delay, "seconds")
-        check_number("dwell.brake_power", self.brake_power, "watts", optional=True)
+        check_holding("dwell", self.hold, self.brake_delay, self.brake_power)
+
+
+def check_holding(field: str, hold: object, brake_delay: object, brake_power: object) -> None:
+    """Check how an arm is held at rest, as by the attributes of `Dwell`.
+
+    Raises:
+        InvalidProblem: a value is out of range; names it as a part of `field`.
+    """
+    check_choice(f"{field}.hold", hold, Hold)
+    check_number(f"{field}.brake_delay", brake_delay, "seconds")
+    check_number(f"{field}.brake_power", brake_power, "watts", optional=True)

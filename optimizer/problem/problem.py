@@ -92,7 +92,9 @@ class Problem:
     def __post_init__(self) -> None:
         check_parts(self)
         for name in ("start", "goal"):
-            end = validated(self.arm, name, getattr(self, name), on_path=self.tool_path is not None)
+            end = validated(
+                self.arm, name, getattr(self, name), free_start=self.tool_path is not None
+            )
             object.__setattr__(self, name, end)
         check_search(self)
         for name in ("duration_min", "duration_max"):

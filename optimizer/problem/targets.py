@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -70,7 +70,7 @@ def single(target: Target) -> Single:
     return target
 
 
-def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Target:
+def validated(arm: Arm, name: str, target: Target, free_start: bool = False) -> Target:
     """A target of a problem, with its joint positions as read-only arrays.
 
     Joint positions of an AnyOf may be out of range: they count as unreachable.
@@ -79,7 +79,7 @@ def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Tar
         arm: arm of the problem.
         name: `start`, `goal`, or another field.
         target: the target.
-        on_path: whether the target is an end of a tool path; a start may then be free in part.
+        free_start: whether the orientation of a start may be free in part, as on a tool path.
 
     Raises:
         InvalidProblem: the target is malformed, or a start with an orientation tolerance.
@@ -87,7 +87,7 @@ def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Tar
     """
     if (
         name == "start"
-        and not on_path
+        and not free_start
         and any(isinstance(member, ConeOrientedPose) for member in members(target))
     ):
         raise InvalidProblem(
@@ -137,11 +137,4 @@ def validated_in_cycle(arm: Arm, field: str, target: Target) -> Target:
             "Of several targets, each has its orientation in full: give a quaternion, rpy or "
             "rotvec.",
         )
-    try:
-        return validated(arm, "goal", target)
-    except OutsideLimits as error:
-        raise OutsideLimits(field, error.joint, error.value, error.lower, error.upper) from None
-    except InvalidProblem as error:
-        raise InvalidProblem(
-            error.field.replace("goal", field, 1), str(error).replace("goal", field, 1)
-        ) from None
+    return validated(arm, field, target, free_start=True)

@@ -135,10 +135,6 @@ class PathAttempt:
     the stop cannot be followed."""
 
 
-LINES = ("/approach", "/retreat")
-"""What the names of a stop's lines end with."""
-
-
 @dataclass(eq=False)
 class PathInfeasible(JoulepathError):
     """From no arm configuration can the tool follow a path, or a line of a stop, to its end."""
@@ -155,6 +151,8 @@ class PathInfeasible(JoulepathError):
     """Arm configurations at the start, the one that gets farthest first; at most 64."""
     path: str = "path"
     """`path`; or `stops/` and the name of the stop whose path it is, or with its line."""
+    is_line: Annotated[bool, Internal] = False
+    """Whether it is a line of a stop."""
     in_parts: Annotated[bool, Internal] = False
     """Whether several configurations, one after the other, do not lead along the path either."""
     joints: Annotated[int, Internal] = POSE_FREEDOMS
@@ -170,7 +168,7 @@ class PathInfeasible(JoulepathError):
             "Move it, widen limits.position, or ask POST /cycle to divide it: a stop's path "
             "with split."
         )
-        if self.path.endswith(LINES):
+        if self.is_line:
             remedy = "Move the stop, shorten the line, or widen limits.position."
         if self.in_parts:
             remedy = (

@@ -99,7 +99,7 @@ _EXAMPLES: dict[type[DeclaredError], DeclaredError] = {
         StartInCollision("start", [_COLLIDING]),
         GoalInCollision("goal", [_COLLIDING]),
         StopInCollision("stops/pick", [_COLLIDING]),
-        PathInfeasible(0.08, [_ATTEMPT], "stops/pick/approach"),
+        PathInfeasible(0.08, [_ATTEMPT], "stops/pick/approach", is_line=True),
         DurationTooShort(bound=0.8298, shortest=0.83, proven=True),
         TorqueInfeasible("shoulder_lift_joint", 171.0, 150.0),
         NoCollisionFreeTrajectory(

@@ -122,6 +122,7 @@ def test_a_line_that_no_configuration_follows_says_how_far_each_gets() -> None:
         plan_cycle(one_stop(retreat=far))
     assert refusal.value.path == "stops/stop 0/retreat" and refusal.value.length == 1.5
     assert {each.reason for each in refusal.value.attempts} <= {"unreachable", "singular"}
+    assert "shorten the line" in str(refusal.value)
 
 
 @pytest.mark.parametrize(

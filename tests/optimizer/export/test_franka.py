@@ -50,6 +50,8 @@ def test_what_no_motion_generator_can_do_is_refused() -> None:
         to_franka(cycle_with_payload("fr3"))
     with pytest.raises(FormatUnsuitable, match="6 joints"):
         to_franka(one_move("ur5e"))
+    with pytest.raises(FormatUnsuitable, match="a controller of Kinova"):
+        to_franka(one_move("gen3"))
     with pytest.raises(FormatUnsuitable, match="UFACTORY"):
         to_franka(one_move("xarm7"))
     with pytest.raises(FormatUnsuitable, match="rows"):

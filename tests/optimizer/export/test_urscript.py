@@ -170,3 +170,9 @@ def test_a_long_motion_is_refused_before_it_fills_the_memory() -> None:
     with pytest.raises(FormatUnsuitable, match="set points"):
         to_urscript(program, UrscriptOptions(form="points"))
     assert len(to_urscript(program).content) < 10_000
+
+
+def test_the_title_of_an_own_arm_does_not_decide_its_maker() -> None:
+    move = one_move("kr10_r1100").moves[0]
+    own = replace(move.arm.robot, title="KUKA with another controller", maker=None)
+    assert to_urscript(Program((replace(move, arm=replace(move.arm, robot=own)),))).content

@@ -32,9 +32,7 @@ def random_spline(arm: Arm, seed: int, q_start: Array | None = None, inner: int 
 def arm_of(robot: str) -> Arm:
     """The arm, without collision checks. OWN is an arm of six joints without a known maker."""
     if robot == OWN:
-        return Arm(
-            robot=replace(load_robot("ur5e"), name=OWN, title="Arm of a user"), collisions=False
-        )
+        return Arm(robot=replace(load_robot("ur5e"), name=OWN, maker=None), collisions=False)
     return Arm(robot=load_robot(robot), collisions=False)
 
 
