@@ -335,13 +335,14 @@ def main() -> int:
         if part in OF_LOGS and place is None:
             print(f"{part}: left out. {MISSING}")
             continue
-        for gate in PARTS[part](place, given.runs):
-            gates.append(gate)
-            limits = f"{gate.least:g} to {gate.most:g}"
-            print(
-                f"{'kept  ' if gate.kept else 'MISSED'}  {gate.what}: {gate.value:.4g} ({limits})",
-                flush=True,
-            )
+        try:
+            for gate in PARTS[part](place, given.runs):
+                gates.append(gate)
+                verdict = "kept  " if gate.kept else "MISSED"
+                within = f"{gate.least:g} to {gate.most:g}"
+                print(f"{verdict}  {gate.what}: {gate.value:.4g} ({within})", flush=True)
+        except FileNotFoundError as missing:
+            print(f"{part}: left out. {missing}")
     write_json(given.json, {"gates": [gate.__dict__ | {"kept": gate.kept} for gate in gates]})
     return 0 if all(gate.kept for gate in gates) else 1
 

@@ -41,11 +41,18 @@ POSSIBLE_V = 4.0
 """Largest plausible joint speed [rad/s]; the recorder has garbled rows with larger values."""
 
 
+def clone(place: Path, name: str) -> Path:
+    """The clone of a repository. Raises FileNotFoundError without one."""
+    if not (folder := place / name).is_dir():
+        raise FileNotFoundError(f"{folder} is no folder: benchmarks.public_logs names its source.")
+    return folder
+
+
 def ur10e_days(
     place: Path, days: Collection[str] = UR10E_DAYS
 ) -> tuple[Robot, dict[str, list[Log]]]:
     """Logs of a UR10e without payload, by day."""
-    files = place / "dynamic_calibration" / "dataset_ur10e" / "identification_data"
+    files = clone(place, "dynamic_calibration") / "dataset_ur10e" / "identification_data"
     robot = load_robot("ur10e")
     return robot, {
         day: [ur10e_log(robot, next(files.glob(f"ur-{day}*{name}.csv"))) for name in names]
@@ -56,7 +63,7 @@ def ur10e_days(
 
 def ur10e_split(place: Path) -> tuple[Robot, Log, Log]:
     """A UR10e, with the log that the authors of the dataset fit, and the log that they predict."""
-    files, robot = place / "dynamic_calibration" / "dataset_ur10e", load_robot("ur10e")
+    files, robot = clone(place, "dynamic_calibration") / "dataset_ur10e", load_robot("ur10e")
     fitted = files / "identification_data" / "ur-20_02_10-30sec_12harm.csv"
     other = files / "validation_data" / "ur-20_01_17-ptp_10_points.csv"
     rows = slice(634, 3510), slice(699, 4200)
@@ -81,7 +88,7 @@ def ur10e_log(robot: Robot, file: Path, chosen: slice = slice(None)) -> Log:
 
 def panda_by_inria(place: Path) -> Log:
     """A log of a Panda over 21 s at 1 kHz, from text files with one value per line."""
-    files = place / "FrankaEmikaPandaDynModel" / "matlab" / "data" / "Exciting_Traj"
+    files = clone(place, "FrankaEmikaPandaDynModel") / "matlab" / "data" / "Exciting_Traj"
     files = files / "Trajectory_1" / "rbt_log"
     robot = load_robot("panda")
     time = np.loadtxt(files / "exciting_traj_time.txt")
@@ -101,7 +108,7 @@ def panda_by_inria(place: Path) -> Log:
 
 def panda_by_unisa(place: Path) -> Log:
     """A log of another Panda over 24 s at 30 Hz."""
-    folder = place / "inverse-dynamics-solver" / "franka_inria_inverse_dynamics_solver"
+    folder = clone(place, "inverse-dynamics-solver") / "franka_inria_inverse_dynamics_solver"
     options = LogOptions(effort="torque", payload=Payload())
     file = folder / "bagfiles" / "panda_exciting_trajectory.db3"
     return read_log(file, load_robot("panda"), options).log
