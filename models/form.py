@@ -37,7 +37,7 @@ FORM = FormSettings()
 
 
 @dataclass(frozen=True)
-class Body:
+class RoundBody:
     """A round body about the line from `start` to `end` [m] in the link frame, with radius [m]."""
 
     kind: Kind
@@ -64,12 +64,12 @@ class _Housing:
         """Its centre (3,)."""
         return self.at((self.low + self.high) / 2)
 
-    def body(self, low: float, high: float, radius: float, kind: Kind) -> Body:
+    def body(self, low: float, high: float, radius: float, kind: Kind) -> RoundBody:
         """A body about its axis."""
-        return Body(kind, self.at(low).tolist(), self.at(high).tolist(), radius)
+        return RoundBody(kind, self.at(low).tolist(), self.at(high).tolist(), radius)
 
 
-def link_bodies(figures: dict[str, Any]) -> list[list[Body]]:
+def link_bodies(figures: dict[str, Any]) -> list[list[RoundBody]]:
     """The bodies of every link by a robot's figures, base first."""
     kinematics = figures["kinematics"]
     names = ["base", *kinematics["link_names"]["value"]]
@@ -86,7 +86,7 @@ def link_bodies(figures: dict[str, Any]) -> list[list[Body]]:
     for pair in pairs:
         _meet(*pair)
     _ground(placements[0], pairs[0][0])
-    bodies: list[list[Body]] = [[] for _ in names]
+    bodies: list[list[RoundBody]] = [[] for _ in names]
     for joint, (first, second) in enumerate(pairs):
         bodies[joint] += [*_bodies(first, second), _ring(first, second)]
         bodies[joint + 1] += _bodies(second, first)
@@ -97,7 +97,9 @@ def link_bodies(figures: dict[str, Any]) -> list[list[Body]]:
         end = (pairs[link][0].middle, pairs[link][0].radius) if link < len(pairs) else last
         bodies[link] += _tube(own, *begin, *end, is_base=link == 0)
     bodies[0].append(
-        Body("foot", [0.0] * 3, [0.0, 0.0, FORM.foot_height], FORM.foot_width * pairs[0][0].radius)
+        RoundBody(
+            "foot", [0.0] * 3, [0.0, 0.0, FORM.foot_height], FORM.foot_width * pairs[0][0].radius
+        )
     )
     return bodies
 
@@ -153,7 +155,7 @@ def _ground(placement: Array, foot: _Housing) -> None:
         foot.high = min(foot.high, height)
 
 
-def _bodies(own: _Housing, other: _Housing) -> list[Body]:
+def _bodies(own: _Housing, other: _Housing) -> list[RoundBody]:
     """A housing with a cap on its outer side."""
     outward = -1 if own.low + own.high < other.low + other.high else 1
     inner, outer = (own.low, own.high) if outward > 0 else (own.high, own.low)
@@ -164,7 +166,7 @@ def _bodies(own: _Housing, other: _Housing) -> list[Body]:
     ]
 
 
-def _ring(own: _Housing, other: _Housing) -> Body:
+def _ring(own: _Housing, other: _Housing) -> RoundBody:
     """The gap between the housings of a joint."""
     inner = own.high if own.low + own.high < other.low + other.high else own.low
     gap = 0.035 * own.radius
@@ -173,7 +175,7 @@ def _ring(own: _Housing, other: _Housing) -> Body:
 
 def _tube(
     capsules: Array, start: Array, start_radius: float, end: Array, end_radius: float, is_base: bool
-) -> list[Body]:
+) -> list[RoundBody]:
     """The tube between the ends of a link, as thick as its long capsules (n, 7).
 
     Overlapping ends need no tube.
@@ -185,4 +187,4 @@ def _tube(
     long = capsules[lengths > 0.4 * span, 6]
     widest = 0.92 * min(start_radius, end_radius)
     slim = min(widest, FORM.slimming * float(long.max()) if len(long) else 0.8 * widest)
-    return [Body("tube", start.tolist(), end.tolist(), widest if is_base else slim)]
+    return [RoundBody("tube", start.tolist(), end.tolist(), widest if is_base else slim)]

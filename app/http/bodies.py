@@ -79,7 +79,7 @@ class Bodies:
         raise UnsupportedCoding
 
 
-class Body:
+class RequestBody:
     """The body of one request.
 
     Reading it raises BodyTooLarge, RequestTimeout, TooManyBytes or TooManyBytesOfClient beyond a

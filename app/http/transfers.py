@@ -10,7 +10,7 @@ from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.exceptions.base import ServiceError
 from joulepath.app.exceptions.queue import Busy
 from joulepath.app.http.authentication import authenticate
-from joulepath.app.http.bodies import Bodies, Body
+from joulepath.app.http.bodies import Bodies, RequestBody
 from joulepath.app.http.bytes_in_flight import BytesInFlight, Held
 from joulepath.app.http.client import client_of
 from joulepath.app.http.compression import Coding, Compression
@@ -56,7 +56,7 @@ class Transfers:
             Held(self._in_flight, client) as body_held,
             Held(self._in_flight, client) as answer_held,
         ):
-            body = Body(self._bodies, request, receive, body_held)
+            body = RequestBody(self._bodies, request, receive, body_held)
             answer = _Answer(request, receive, send, answer_held, self._compression, coding)
             await self._app(scope, body.receive, answer.send)
 

@@ -44,7 +44,7 @@ CONTINUOUS = 2 * math.pi
 
 
 @dataclass(frozen=True)
-class ChainSettings:
+class UrdfSettings:
     """Ceilings and tolerances of a URDF."""
 
     joints: int = 16
@@ -61,7 +61,7 @@ class ChainSettings:
     """Deviation from zero [m] due to rounding: eleven digits of a length."""
 
 
-CHAIN = ChainSettings()
+CHAIN = UrdfSettings()
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,7 @@ class HoldingCells:
             return None
         return cls(prepared, HoldingBound(arm, ChainDerivatives.of(arm), loss))
 
-    def group(self, start: Array, low: Array, high: Array, gain: Array, plain: Array) -> Group:
+    def group(self, start: Array, low: Array, high: Array, gain: Array, plain: Array) -> CellGroup:
         """Bounds on motions into boxes of goals.
 
         Args:
@@ -99,7 +99,9 @@ class HoldingCells:
         line = Line.of(self.bound.chain, start, np.sign(d) * nearest)
         planes = self.bound(line, 2 * half, edges, eta, net.deficit)
         turn = d - ((low + high) / 2 - start)
-        return Group(planes, start + np.sign(d) * nearest - turn, np.where(allowed, cap, np.inf))
+        return CellGroup(
+            planes, start + np.sign(d) * nearest - turn, np.where(allowed, cap, np.inf)
+        )
 
     def _cells(self, net: NetEnergy, away: Array, cap: Array) -> tuple[Array, Array, Mask]:
         """Cells of the durations between which the plain bound is below a cap.
@@ -156,7 +158,7 @@ class HoldingCells:
 
 
 @dataclass(frozen=True)
-class Group:
+class CellGroup:
     """Bounds of motions into boxes of goals."""
 
     planes: Planes

@@ -11,14 +11,14 @@ from joulepath.models.robot import Array
 
 
 @dataclass(frozen=True)
-class ChainSettings:
+class LeastChainSettings:
     """Settings of least chains."""
 
     rounding: float = 1e-12
     """Relative rounding error of a sum of costs, far above that of thousands of legs."""
 
 
-CHAINS = ChainSettings()
+CHAINS = LeastChainSettings()
 
 
 class LeastChain:

@@ -25,9 +25,9 @@ from joulepath.optimizer.dynamics.kernel_cache import compile_kernel, library_pa
 from joulepath.optimizer.dynamics.kernel_expressions import build
 from joulepath.optimizer.dynamics.kernel_functions import (
     Compiled,
-    Evaluation,
     Functions,
     Interpreted,
+    KernelEvaluation,
 )
 from joulepath.optimizer.native.build import compiler
 from joulepath.optimizer.native.library_cache import is_intact, mark_used, seal_path
@@ -54,7 +54,7 @@ class _Evaluations(threading.local):
     """
 
     def __init__(self) -> None:
-        self.known: dict[tuple[str, int], Evaluation] = {}
+        self.known: dict[tuple[str, int], KernelEvaluation] = {}
 
 
 class Kernel:
@@ -71,7 +71,7 @@ class Kernel:
         self._functions = functions
         self._evaluations = _Evaluations()
 
-    def _evaluation(self, name: str, count: int) -> Evaluation:
+    def _evaluation(self, name: str, count: int) -> KernelEvaluation:
         known, key = self._evaluations.known, (name, count)
         if key not in known:
             known[key] = self._functions.evaluation(name, count)

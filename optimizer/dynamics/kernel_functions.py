@@ -19,7 +19,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.kernel_expressions import SYMBOLICS, sizes
 
 
-class Evaluation:
+class KernelEvaluation:
     """A function of a fixed number of nodes, with its own memory, for use by one thread.
 
     The function reads its arguments from numpy arrays and writes its results into others, without
@@ -48,7 +48,7 @@ class Functions(Protocol):
 
     compiled: bool
 
-    def evaluation(self, name: str, count: int) -> Evaluation:
+    def evaluation(self, name: str, count: int) -> KernelEvaluation:
         """Evaluation of the function `name` of `count` nodes, for the calling thread."""
         ...
 
@@ -62,7 +62,7 @@ class Interpreted:
         self._functions = {each.name(): each for each in functions}
         self._mapped: dict[tuple[str, int], ca.Function] = {}
 
-    def evaluation(self, name: str, count: int) -> Evaluation:
+    def evaluation(self, name: str, count: int) -> KernelEvaluation:
         """Evaluation of a function, see `Functions`."""
         key = (name, count)
         with SYMBOLICS:
@@ -88,12 +88,12 @@ class Compiled:
         # process another thread may still use the library, so it is not unloaded then.
         weakref.finalize(self, _ctypes.dlclose, self._library._handle).atexit = False
 
-    def evaluation(self, name: str, count: int) -> Evaluation:
+    def evaluation(self, name: str, count: int) -> KernelEvaluation:
         """Evaluation of a function, see `Functions`."""
         return _Called(self, getattr(self._library, name), *sizes(self._nq)[name], count)
 
 
-class _Mapped(Evaluation):
+class _Mapped(KernelEvaluation):
     """CasADi function mapped over the nodes."""
 
     def __init__(self, mapped: ca.Function) -> None:
@@ -106,7 +106,7 @@ class _Mapped(Evaluation):
             self._buffer.set_res(i, memoryview(array))  # type: ignore[call-arg, arg-type]
 
 
-class _Called(Evaluation):
+class _Called(KernelEvaluation):
     """Library function with its own loop over the nodes; it keeps the library loaded."""
 
     def __init__(

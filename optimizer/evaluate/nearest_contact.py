@@ -19,7 +19,7 @@ from joulepath.optimizer.result.certificate import Clearance
 
 
 @dataclass(frozen=True)
-class ClearanceSettings:
+class NearestContactSettings:
     """Settings of the sampling of clearances."""
 
     period: float = 0.01
@@ -32,7 +32,7 @@ class ClearanceSettings:
     """Pairs times configurations that are checked at once."""
 
 
-CLEARANCE = ClearanceSettings()
+CLEARANCE = NearestContactSettings()
 
 
 @dataclass(frozen=True)

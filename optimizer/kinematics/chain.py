@@ -14,7 +14,7 @@ from joulepath.optimizer.kinematics.forward import joint_placements
 
 
 @dataclass(frozen=True)
-class ChainSettings:
+class ForwardSettings:
     """Settings of forward kinematics and pose errors."""
 
     smallest_sine: float = 1e-12
@@ -27,7 +27,7 @@ class ChainSettings:
     """
 
 
-CHAIN = ChainSettings()
+CHAIN = ForwardSettings()
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,7 +52,7 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class MovableBody:
     """A movable body: its discrete choices, and the nominal values of its coordinates.
 
     Attributes:
@@ -90,7 +90,7 @@ class Space:
     """All places of a placement."""
 
     placement: Placement
-    bodies: tuple[Body, ...]
+    bodies: tuple[MovableBody, ...]
     axes: tuple[Axis, ...]
 
     @classmethod
@@ -100,7 +100,7 @@ class Space:
         Raises:
             InvalidProblem: the nominal place is not in a region, or it is the only place.
         """
-        bodies, axes = list[Body](), list[Axis]()
+        bodies, axes = list[MovableBody](), list[Axis]()
         for k, moved in enumerate(placement.moved):
             body = _body(placement, k)
             bodies.append(body)
@@ -232,15 +232,15 @@ class Space:
         return most_counts(self.axes, len(self.choices))
 
 
-def _body(placement: Placement, k: int) -> Body:
+def _body(placement: Placement, k: int) -> MovableBody:
     moved = placement.moved[k]
     is_base = moved.moves == "base"
     given = placement.base if is_base else np.eye(4)
     if isinstance(moved.region, Places):
         others = [pose for pose in moved.region.poses if not np.array_equal(pose, given)]
-        return Body(None, (given, *others), np.zeros(4), np.zeros(3))
+        return MovableBody(None, (given, *others), np.zeros(4), np.zeros(3))
     if isinstance(moved.moves, Group):
-        return Body((np.eye(3),), None, np.zeros(4), _pivot(placement, moved.moves))
+        return MovableBody((np.eye(3),), None, np.zeros(4), _pivot(placement, moved.moves))
     R = given[:3, :3]
     yaw, mount = yaw_of(R), mount_of(R)
     tilts: dict[Mount | None, Array] = {mount: about_z(-yaw) @ R}
@@ -255,10 +255,10 @@ def _body(placement: Placement, k: int) -> Body:
         if name != mount:
             tilts[name] = TILTS[name]
     nominal = np.array([*given[:3, 3], yaw])
-    return Body(tuple(tilts.values()), None, nominal, np.zeros(3), tuple(tilts))
+    return MovableBody(tuple(tilts.values()), None, nominal, np.zeros(3), tuple(tilts))
 
 
-def _axes(placement: Placement, k: int, region: Region, body: Body) -> Iterator[Axis]:
+def _axes(placement: Placement, k: int, region: Region, body: MovableBody) -> Iterator[Axis]:
     for name, nominal in zip(COORDINATES, body.nominal.tolist(), strict=True):
         given = region.range_of(name)
         if given is None:

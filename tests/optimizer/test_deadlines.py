@@ -39,7 +39,7 @@ from joulepath.optimizer.deadline import (
     watch,
     watched_time_left,
 )
-from joulepath.optimizer.dynamics.kernel_functions import Evaluation
+from joulepath.optimizer.dynamics.kernel_functions import KernelEvaluation
 from joulepath.optimizer.search.candidates import Reason
 from joulepath.optimizer.search.finishing_time import finishing_time
 from tests.optimizer.cells import at
@@ -84,7 +84,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> WorkClock:
     """A clock advanced by every expensive call of the library."""
     mine = WorkClock()
     prices: list[tuple[Any, str, Callable[..., float]]] = [
-        (Evaluation, "__call__", lambda self, *arguments: NODE * len(arguments[0])),
+        (KernelEvaluation, "__call__", lambda self, *arguments: NODE * len(arguments[0])),
         (pin, "rneaInParallel", lambda threads, pool, q, *rest: INSTANT * q.shape[1]),
         (pin, "forwardKinematics", lambda *arguments: PLACEMENT),
         (coal_distance.coal, "distance", lambda *arguments: DISTANCE),

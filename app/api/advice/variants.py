@@ -14,7 +14,7 @@ Task = OptimizeRequest | CycleRequest
 
 
 @dataclass(frozen=True)
-class AdviceSettings:
+class VariantSettings:
     """Sizes of the changes."""
 
     brake_delay: float = 0.5
@@ -27,7 +27,7 @@ class AdviceSettings:
     """Least share of the energy that is worth a change."""
 
 
-ADVICE = AdviceSettings()
+ADVICE = VariantSettings()
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from joulepath.optimizer.result.energy import Objective
 from joulepath.optimizer.result.solution import Solution, SolvedMotion
 
 
-class Asked(Protocol):
+class Repeated(Protocol):
     """Fields of the request that its answer repeats."""
 
     robot: str
@@ -52,7 +52,7 @@ class OptimizeAnswer(SolvedMotion, MotionAnswer):
 
     @classmethod
     def of(
-        cls, request: Asked, request_id: str, solution: Solution, arm: dict[str, Any] | None
+        cls, request: Repeated, request_id: str, solution: Solution, arm: dict[str, Any] | None
     ) -> Self:
         """Build the answer from a solution; the store adds its id later.
 

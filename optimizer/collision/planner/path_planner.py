@@ -81,7 +81,7 @@ USUAL_EFFORT = Effort()
 
 
 @dataclass(frozen=True)
-class Region:
+class SampledBox:
     """Box of configurations that a search samples: `margin` [rad] beyond the range of start and
     goals, within the joint limits.
 
@@ -98,10 +98,10 @@ class Region:
 
 
 REGIONS = (
-    Region(0.7, 400, before=4_000),
-    Region(2.2, 1_600),
-    Region(2.2, 800, 20_000, narrow=True),
-    Region(3.5, 800, 20_000),
+    SampledBox(0.7, 400, before=4_000),
+    SampledBox(2.2, 1_600),
+    SampledBox(2.2, 800, 20_000, narrow=True),
+    SampledBox(3.5, 800, 20_000),
 )
 """Regions of the searches. Narrow bounds give short paths, if any; wide bounds contain ways out of
 a cage. No margin allows a needless full turn of a joint. The last searches are for gaps that the
@@ -192,7 +192,7 @@ class _Planning:
         )
         self._checkers, self._reserves, self._deadline = checkers, reserves, deadline
         self._begin, self._ends = _known_parts(q_start, q_goals, template, self._weights)
-        self._searches: dict[Region, PathSearch] = {}
+        self._searches: dict[SampledBox, PathSearch] = {}
         self._steps = {
             region: PLANNER.step / 2 if region.narrow else PLANNER.step for region in REGIONS
         }
@@ -222,7 +222,7 @@ class _Planning:
                     effort = USUAL_EFFORT if self.checked_states < effort.easy else effort
                     most_states = min(most_states, self.checked_states + effort.more_states)
 
-    def _slice(self, region: Region, left: int) -> Array | None:
+    def _slice(self, region: SampledBox, left: int) -> Array | None:
         """Path found by a region's search in its slice, if any; the region then begins a new
         search.
 
@@ -241,7 +241,7 @@ class _Planning:
             del self._searches[region]
         return path
 
-    def _search(self, region: Region) -> PathSearch:
+    def _search(self, region: SampledBox) -> PathSearch:
         """New search in a region."""
         ends = np.vstack([self._begin[:1], *(end[-1:] for end in self._ends)])
         return PathSearch(
