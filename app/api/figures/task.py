@@ -112,9 +112,16 @@ class FiguresTask:
     def run(self, deadline: float) -> TaskResult:
         """The replacing figures as JSON, in milliseconds without a watch on `deadline`.
 
-        Raises UnknownRobot, or InvalidProblem with the place.
+        Raises UnknownRobot, or InvalidProblem with the place or if no figure differs.
         """
-        return TaskResult.of_json(replacing(self.request.robot, self.request.document()))
+        content = replacing(self.request.robot, self.request.document())
+        if all(section == {} for section in content.values()):
+            raise InvalidProblem(
+                "robot",
+                f"No figure differs from those of {self.request.robot}: give friction_laws, "
+                "drives, electronics, mains or inertials of your own arm.",
+            )
+        return TaskResult.of_json(content)
 
 
 def replacing(name: str, document: dict[str, Any]) -> dict[str, Any]:

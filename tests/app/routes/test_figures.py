@@ -243,6 +243,16 @@ def test_what_makes_no_figures(client: TestClient, name: str) -> None:
     assert document["robot"] == "ur5e" and json.dumps(document)
 
 
+@pytest.mark.parametrize("section", ["friction_laws", "drives", None])
+def test_a_document_with_the_robots_own_figures_alone_is_refused(
+    client: TestClient, section: str | None
+) -> None:
+    own = load_robot("ur5e").figures
+    document = {"robot": "ur5e"} | ({} if section is None else {section: own[section]})
+    error = refused(client.put("/figures", json=document), InvalidRequest)["errors"][0]
+    assert "No figure differs" in error["msg"] and "friction_laws" in error["msg"]
+
+
 def test_a_document_names_its_robot() -> None:
     with pytest.raises(InvalidFigures, match="another robot than ur10e"):
         load_robot("ur10e", figures=FIGURES)
