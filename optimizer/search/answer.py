@@ -21,11 +21,25 @@ from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.path_ends import bound_beside
 from joulepath.optimizer.search.state import SearchState
 
-OVERTIME = 0.1
-"""Time after the deadline at which a certificate is given up [s].
 
-An answer a little late is better than none.
-"""
+@dataclass(frozen=True)
+class AnswerSettings:
+    """Settings of an answer."""
+
+    overtime: float = 0.1
+    """Time after the deadline at which a certificate is given up [s]: an answer a little late is
+    better than none."""
+    mechanical_gap: float = 0.01
+    """Greatest `optimality_gap` of mechanical work that is called `optimal`.
+
+    A motion has many local optima of mechanical work. Of 47 answers whose other candidates were all
+    ruled out or solved, 25 were more than 0.5 % above the best motion known and one was 13 % above
+    it, so convergence alone proves nothing. Electrical energy has hardly any local optima that
+    matter: it suffices that the solver converges and that bounds rule out all other candidates.
+    """
+
+
+ANSWER = AnswerSettings()
 
 
 def answer(state: SearchState, best: Candidate, baselines: list[Baseline]) -> Solution | None:
@@ -41,7 +55,7 @@ def answer(state: SearchState, best: Candidate, baselines: list[Baseline]) -> So
     """
     spline, prepared, problem = best.spline, state.prepared, state.problem
     try:
-        with watch(state.end.earlier_by(-OVERTIME)):
+        with watch(state.end.earlier_by(-ANSWER.overtime)):
             energy = prepared.energy(spline)
             certificate = state.certified(best, spline, energy)
             if not certificate.valid:
@@ -132,28 +146,11 @@ def final_bound(state: SearchState, objective: float) -> tuple[float, bool]:
     return least, is_ruled_out and all_branches_known(state.problem)
 
 
-@dataclass(frozen=True)
-class OptimalitySettings:
-    """Settings of the condition under which an answer is called `optimal`."""
-
-    mechanical_gap: float = 0.01
-    """Greatest `optimality_gap` of mechanical work.
-
-    A motion has many local optima of mechanical work. Of 47 answers whose other candidates were all
-    ruled out or solved, 25 were more than 0.5 % above the best motion known and one was 13 % above
-    it, so convergence alone proves nothing. Electrical energy has hardly any local optima that
-    matter: it suffices that the solver converges and that bounds rule out all other candidates.
-    """
-
-
-OPTIMALITY = OptimalitySettings()
-
-
 def may_be_optimal(
     objective: Objective,
     energy: float,
     lower_bound: float,
-    settings: OptimalitySettings = OPTIMALITY,
+    settings: AnswerSettings = ANSWER,
 ) -> bool:
     """Whether the gap between an energy and its lower bound allows the word `optimal`.
 

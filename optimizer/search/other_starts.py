@@ -8,6 +8,7 @@ posture may reach a better optimum; both ends are then optimised along their sel
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 
 from joulepath.optimizer.dynamics.plant import has_corners
@@ -25,11 +26,19 @@ from joulepath.optimizer.solve.methods.solve_result import MotionOrigin, SolveRe
 from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 from joulepath.optimizer.solve.nlp.sqp_state import SQP
 
-STEP_LENGTH = 0.15
-"""Length of the step along a curve [rad]."""
-PROMISE_MARGIN = 1.003
-"""Factor on the energy that a solve must promise to come below, since its first steps promise less
-than it finds."""
+
+@dataclass(frozen=True)
+class OtherStartSettings:
+    """Settings of the search from other initial guesses."""
+
+    step: float = 0.15
+    """Length of the step along a curve [rad]."""
+    promise_margin: float = 1.003
+    """Factor on the energy that a solve must promise to come below, since its first steps promise
+    less than it finds."""
+
+
+OTHER_STARTS = OtherStartSettings()
 
 
 def start_beside(state: SearchState, best: Candidate) -> Candidate:
@@ -62,7 +71,7 @@ def start_beside(state: SearchState, best: Candidate) -> Candidate:
             continue
         q = {"start": first.q_start, "goal": first.q_goal}
         curve = HeldPose.of(prepared.arm, q[side])
-        for step in (STEP_LENGTH, -STEP_LENGTH):
+        for step in (OTHER_STARTS.step, -OTHER_STARTS.step):
             beside = curve.put(q[side] + step * curve.tangent(q[side]))
             if beside is None or state.deadline.passed:
                 continue
@@ -86,7 +95,7 @@ def _solved(state: SearchState, candidate: Candidate, below: float) -> bool:
         Whether the energy of the candidate is below `below`.
     """
     for interval in duration_intervals(state.prepared, candidate.q_goal):
-        solver = solver_of(state, candidate, interval, above(below, PROMISE_MARGIN))
+        solver = solver_of(state, candidate, interval, above(below, OTHER_STARTS.promise_margin))
         result = in_time(state, solver.solve)
         if result.spline is None or state.prepared.cost_of(result.spline) >= below:
             continue

@@ -9,6 +9,7 @@ until they no longer matter.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,10 +23,18 @@ from joulepath.optimizer.search.sampled_ends import nearest_configuration, refin
 from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.search.state import SearchState
 
-FIRST_STEP = np.pi / SAMPLING.members
-"""First step of a parameter [rad]: half the distance of two samples on a whole circle."""
-LEAST_STEP = 2e-3
-"""Least step of a parameter [rad]."""
+
+@dataclass(frozen=True)
+class SelfMotionSettings:
+    """Settings of the search along self-motions."""
+
+    first_step: float = np.pi / SAMPLING.members
+    """First step of a parameter [rad]: half the distance of two samples on a whole circle."""
+    least_step: float = 2e-3
+    """Least step of a parameter [rad]."""
+
+
+SELF_MOTIONS = SelfMotionSettings()
 
 
 def refine(state: SearchState) -> list[Candidate]:
@@ -76,8 +85,8 @@ def _descend(state: SearchState, candidate: Candidate, sides: Sequence[Side]) ->
 
     It is the candidate itself if no step is better.
     """
-    best, step = candidate, float(FIRST_STEP)
-    while sides and step > LEAST_STEP and not state.deadline.passed:
+    best, step = candidate, SELF_MOTIONS.first_step
+    while sides and step > SELF_MOTIONS.least_step and not state.deadline.passed:
         steps = [(side, sign * step) for side in sides for sign in (1, -1)]
         tried = (_moved(state, best, side, by) for side, by in steps)
         better = next(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from joulepath.optimizer.bounds.missed_branches import all_branches_known
 from joulepath.optimizer.deadline import DeadlinePassed, checkpoint, watch
@@ -39,8 +39,16 @@ from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveRes
 
 Stage = Callable[[SearchState], None]
 
-STORAGE_SHARE = 0.5
-"""Share of the time left for the search without energy storage."""
+
+@dataclass(frozen=True)
+class StageSettings:
+    """Settings of the stages of a search."""
+
+    storage_share: float = 0.5
+    """Share of the time left for the search without energy storage."""
+
+
+STAGES = StageSettings()
 
 
 def find_candidates(state: SearchState) -> None:
@@ -79,7 +87,7 @@ def solve_without_storage(state: SearchState) -> None:
     if state.uses_storage:
         arm = replace(state.problem.arm, bus=Bus())
         state.without_storage = solve_related(
-            state, replace(state.problem, arm=arm), share=STORAGE_SHARE
+            state, replace(state.problem, arm=arm), share=STAGES.storage_share
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -13,11 +13,20 @@ from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.refinement import refine
 from joulepath.optimizer.search.state import SearchState
 
-LIMIT_RESERVE = 2e-3
-"""Share by which limits become tighter beyond the excess of the rejected motion."""
 WITHIN_TIGHTER = (
     "converged within tighter limits, after the certificate did not confirm the first motion"
 )
+
+
+@dataclass(frozen=True)
+class TightenedLimitSettings:
+    """Settings of the second solve of a motion that the certificate rejected."""
+
+    reserve: float = 2e-3
+    """Share by which limits become tighter beyond the excess of the rejected motion."""
+
+
+TIGHTENED_LIMITS = TightenedLimitSettings()
 
 
 def retry_within_tighter_limits(state: SearchState, candidate: Candidate) -> None:
@@ -53,7 +62,7 @@ def _tightened(state: SearchState, candidate: Candidate) -> Arm | None:
     except DeadlinePassed:
         return None
     share = {
-        name: 1 / (ratio * (1 + LIMIT_RESERVE)) if ratio > 1 else 1.0
+        name: 1 / (ratio * (1 + TIGHTENED_LIMITS.reserve)) if ratio > 1 else 1.0
         for name, ratio in worst.items()
     }
     if all(each == 1.0 for name, each in share.items() if name != "position"):

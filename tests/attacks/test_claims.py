@@ -11,7 +11,7 @@ from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.motion.seven_segment import shortest_duration
-from joulepath.optimizer.search.answer import OPTIMALITY
+from joulepath.optimizer.search.answer import ANSWER
 from tests.optimizer.moves import ROBOT, problem
 from tests.selection import long_but
 
@@ -101,6 +101,6 @@ def test_mechanical_work_is_optimal_only_below_its_stated_gap(seed: int) -> None
     for solution in (up_to, fixed):
         work = solution.energy.mechanical.total
         gap = 1 - solution.lower_bound / work
-        assert solution.status == ("optimal" if gap <= OPTIMALITY.mechanical_gap else "feasible")
+        assert solution.status == ("optimal" if gap <= ANSWER.mechanical_gap else "feasible")
     # rest does no work
     assert up_to.energy.mechanical.total <= fixed.energy.mechanical.total

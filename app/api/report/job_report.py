@@ -22,7 +22,7 @@ from joulepath.app.api.report.numbers import (
 from joulepath.app.api.report.programs import program_of_motion
 from joulepath.app.api.report.report import Report, Rival, Table
 from joulepath.app.api.report.rivals import (
-    EQUAL,
+    REPORT,
     above_least,
     limits_used,
     nearest_rival,
@@ -118,7 +118,7 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
 
 
 def _against(saving: float) -> str:
-    if abs(saving) < EQUAL:
+    if abs(saving) < REPORT.equal:
         return "as much as"
     return f"*{percent(saving)} less* than" if saving > 0 else f"{percent(-saving)} more than"
 
@@ -147,7 +147,7 @@ def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
                 max(ratios[name], 0.0) / most,
                 saved(saving(ours, theirs)),
                 True,
-                saves=saving(ours, theirs) >= EQUAL,
+                saves=saving(ours, theirs) >= REPORT.equal,
             )
             for name, (count, theirs, ours) in sorted(
                 found.items(), key=lambda each: (each[0] != "nearest", -each[1][0])

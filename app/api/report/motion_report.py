@@ -20,7 +20,7 @@ from joulepath.app.api.report.drawings import Course, Leg, Stop, drawn
 from joulepath.app.api.report.numbers import counted, digits, down, percent, share, unbroken, up
 from joulepath.app.api.report.report import Report, Rival
 from joulepath.app.api.report.rivals import (
-    EQUAL,
+    REPORT,
     above_least,
     limits_used,
     nearest_rival,
@@ -105,7 +105,7 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
     best = nearest_rival(answer, length if length > answer["duration"] else None)
     if best is None:
         claim = f". No usual way is known that keeps every limit{within}: no saving is claimed."
-    elif best["saving"] < -EQUAL:
+    elif best["saving"] < -REPORT.equal:
         more = percent(-_share(answer, best, held))
         name, time = rival_name(best), digits(best["duration"])
         claim = (
@@ -115,7 +115,7 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
             else f". With a wait until the {time} s of a usual way that keeps every limit, “{name}”"
             f", it needs {more} more: ask for a {word} over that time."
         )
-    elif best["saving"] < EQUAL:
+    elif best["saving"] < REPORT.equal:
         claim = f", as much as the nearest usual way that keeps every limit, {_words(best)}."
     else:
         less = percent(_share(answer, best, held))
@@ -181,7 +181,7 @@ def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
                 max(each[objective] / most, 0.0),
                 _broken(each) if each["saving"] is None else saved(each["saving"]),
                 each["saving"] is not None,
-                saves=(each["saving"] or 0.0) >= EQUAL,
+                saves=(each["saving"] or 0.0) >= REPORT.equal,
             )
             for each in table
         ),

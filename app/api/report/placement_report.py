@@ -20,7 +20,7 @@ from joulepath.app.api.report.numbers import digits, down, percent, share, unbro
 from joulepath.app.api.report.placed import of_cycle, rows_at
 from joulepath.app.api.report.programs import program_of
 from joulepath.app.api.report.report import Fact, Report, Rival, Table
-from joulepath.app.api.report.rivals import EQUAL, above_least, parts_of, saved
+from joulepath.app.api.report.rivals import REPORT, above_least, parts_of, saved
 from joulepath.optimizer.dynamics.losses import saving
 from joulepath.optimizer.placement.mounts import yaw_of
 from joulepath.optimizer.problem.pose import Pose
@@ -107,7 +107,7 @@ def _lead(bundle: Bundle, money: Money) -> tuple[str, ...]:
     )
     if nominal is None:
         first += f". At the nominal place there is none: {_COULD[answer['nominal_reason']]}."
-    elif saving is None or saving < EQUAL:
+    elif saving is None or saving < REPORT.equal:
         first += ". The nominal place is as good."
     else:
         first += f": *{percent(saving)} less* than at the nominal place."

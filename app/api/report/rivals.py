@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from joulepath.app.api.report.numbers import digits, down, percent, share
@@ -45,13 +46,23 @@ LIMITS = {
     "tcp_speed": "speed of the TCP",
     "elbow_speed": "speed of the elbow",
 }
-EQUAL = 0.0005
-"""Largest saving that is none, to the digit after the point that is written."""
-_AS_FAST = 1.05
-"""Ratio of a rival's duration to the answer's up to which it is about as fast."""
-_LEAST_PART = 0.003
-"""Least share of the energy of a part with a line of its own."""
-_FULLY = 0.99
+
+
+@dataclass(frozen=True)
+class ReportSettings:
+    """Settings of what a report says of figures."""
+
+    equal: float = 0.0005
+    """Largest saving that is none, to the digit after the point that is written."""
+    as_fast: float = 1.05
+    """Ratio of a rival's duration to the answer's up to which it is about as fast."""
+    least_part: float = 0.003
+    """Least share of the energy of a part with a line of its own."""
+    fully: float = 0.99
+    """Least ratio of a quantity to its limit at which the limit is fully used."""
+
+
+REPORT = ReportSettings()
 
 
 def rival_name(rival: Mapping[str, Any]) -> str:
@@ -72,7 +83,7 @@ def nearest_rival(answer: Mapping[str, Any], period: float | None = None) -> dic
         The rival, or None if no rival is within the limits and the period.
     """
     claimed = [each for each in answer["baselines"] if each["saving"] is not None]
-    time = _AS_FAST * answer["duration"] if period is None else period
+    time = REPORT.as_fast * answer["duration"] if period is None else period
     fast = [each for each in claimed if each["duration"] <= time]
     found = fast if fast or period is not None else claimed
     return min(found, key=lambda each: float(each["saving"]), default=None)
@@ -86,7 +97,7 @@ def their_energy(ours: float, saving: float) -> float:
 
 def saved(saving: float) -> str:
     """A saving in words."""
-    if abs(saving) < EQUAL:
+    if abs(saving) < REPORT.equal:
         return "needs as much"
     return f"saves {percent(saving)}" if saving > 0 else f"needs {percent(-saving)} less"
 
@@ -105,11 +116,13 @@ def parts_of(electrical: Mapping[str, Any]) -> tuple[Part, ...]:
     """The parts of an electrical energy, largest first."""
     total = electrical["total"]
     known = {name: float(electrical.get(name) or 0.0) for name in _PARTS}
-    shown = {name: value for name, value in known.items() if abs(value) > _LEAST_PART * abs(total)}
+    shown = {
+        name: value for name, value in known.items() if abs(value) > REPORT.least_part * abs(total)
+    }
     rest = total - sum(shown.values())
     rows = sorted(shown.items(), key=lambda each: -each[1])
     parts = [Part(*_PARTS[name], *_in_joules(value, total)) for name, value in rows]
-    if abs(rest) > _LEAST_PART * abs(total):
+    if abs(rest) > REPORT.least_part * abs(total):
         parts.append(Part("Other", "#e2e7ec", *_in_joules(rest, total)))
     return tuple(parts)
 
@@ -124,11 +137,11 @@ def limits_used(worst_ratio: Mapping[str, float | None]) -> str:
     ratios = {
         name: value for name, value in worst_ratio.items() if name in LIMITS and value is not None
     }
-    full = [LIMITS[name] for name, value in ratios.items() if value >= _FULLY]
+    full = [LIMITS[name] for name, value in ratios.items() if value >= REPORT.fully]
     others = [
         f"{LIMITS[name]} to {value:.0%}".replace("%", " %")
         for name, value in ratios.items()
-        if value < _FULLY
+        if value < REPORT.fully
     ]
     return ", ".join(([f"{listed(full)} used fully"] if full else []) + others)
 

@@ -21,9 +21,20 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 
 logging.getLogger("toppra").setLevel(logging.ERROR)
 
-GRID = np.linspace(0.0, 1.0, 31)
-# share of toppra's duration that is taken as a lower bound: its constraints hold at the grid alone
-BOUND_SHARE = 0.98
+
+@dataclass(frozen=True)
+class TimeOptimalSettings:
+    """Settings of toppra."""
+
+    points: int = 31
+    """Points of the line at which its constraints hold."""
+    bound_share: float = 0.98
+    """Share of its duration that is taken as a lower bound: between the points, its constraints may
+    be broken."""
+
+
+TIME_OPTIMAL = TimeOptimalSettings()
+GRID = np.linspace(0.0, 1.0, TIME_OPTIMAL.points)
 
 
 @dataclass(frozen=True)
@@ -31,12 +42,12 @@ class TimeOptimalScaling:
     """Time scaling of the straight line, from rest to rest."""
 
     times: Array
-    """Times at which the fractions GRID of the line are reached, shape (31,) [s]."""
+    """Times at which the fractions GRID of the line are reached, shape (points,) [s]."""
 
     @property
     def duration_bound(self) -> float:
         """Lower bound on the duration of every motion along the line [s]."""
-        return BOUND_SHARE * float(self.times[-1])
+        return TIME_OPTIMAL.bound_share * float(self.times[-1])
 
     def fractions(self, knots: Array) -> Array:
         """Control values (n,) of a spline over clamped knots of [0, 1] along the scaling."""

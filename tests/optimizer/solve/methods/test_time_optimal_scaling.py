@@ -17,8 +17,8 @@ from joulepath.optimizer.motion.time_scalings import quintic
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.baselines import broken_limits
 from joulepath.optimizer.solve.methods.time_optimal_scaling import (
-    BOUND_SHARE,
     GRID,
+    TIME_OPTIMAL,
     time_optimal_on_line,
 )
 from tests.optimizer.moves import (
@@ -55,7 +55,7 @@ def test_one_joint_with_ample_torque_moves_in_a_trapezoid(
     """The last joint at 3.14 rad/s and 10 rad/s²: T = Δ/v + v/a, or 2 (Δ/a)^½ below full speed."""
     law = law_of(START, START + displacement * np.eye(6)[5], **ALMOST_WEIGHTLESS)
     assert law.times[-1] == pytest.approx(duration, rel=GRID_STEP)
-    assert BOUND_SHARE * law.times[-1] == pytest.approx(law.duration_bound)
+    assert TIME_OPTIMAL.bound_share * law.times[-1] == pytest.approx(law.duration_bound)
     assert law.duration_bound <= duration
 
 
