@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Awaitable, Callable
+from typing import Any, Protocol
 
 from moveit_msgs.msg import PlanningScene as SceneMessage
 from moveit_msgs.srv import GetMotionPlan
@@ -13,18 +14,34 @@ from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.ros2.messages import BASE_FRAMES, JointNames, Json, refusal
 from joulepath.app.ros2.motion_plan import REQUEST, SUCCESS, error_code, request_of
 from joulepath.app.ros2.parameters import Parameters
-from joulepath.app.ros2.planner import Plan
+from joulepath.app.ros2.planner import Plan, Planner
 from joulepath.app.ros2.planning_scene import PlanningScene
 from joulepath.app.ros2.trajectory import trajectory_message
+from joulepath.optimizer.deadline import Stopped
+from joulepath.optimizer.exceptions import DeclaredError
 
-if TYPE_CHECKING:
-    from joulepath.app.ros2.node import PlanningNode
+
+class PlanServer(Protocol):
+    """A node that computes plans."""
+
+    create_subscription: Callable[..., Any]
+    create_service: Callable[..., Any]
+
+    @property
+    def planner(self) -> Planner | None:
+        """What computes the plans; None while no robot is known."""
+
+    def outcome(self, fields: Callable[[], Json]) -> Awaitable[Plan | Exception | Stopped]:
+        """A plan for the fields of a request, or its error."""
+
+    def refuse(self, error: DeclaredError) -> None:
+        """Publish a problem that belongs to no goal."""
 
 
 class MoveitInterface:
     """The service `~/plan_kinematic_path` of a node, and its topic `planning_scene`."""
 
-    def __init__(self, node: PlanningNode, own: Parameters) -> None:
+    def __init__(self, node: PlanServer, own: Parameters) -> None:
         """Serve for a node with these parameters."""
         self._node, self._own = node, own
         # UR's `base` is turned against `base_link`: objects must be in the latter
