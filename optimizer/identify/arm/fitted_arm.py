@@ -9,8 +9,8 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.arm.friction_columns import (
-    COUPLED,
     LAW_TERMS,
+    OF_COUPLINGS,
     column,
     deciding_term,
 )
@@ -214,8 +214,8 @@ def with_torques(
     deciding = deciding_term(fitted)
     for ((figure, joint), reason), found in zip(reasons.items(), value.tolist(), strict=True):
         assert joint is not None
-        if figure.startswith(COUPLED):
-            shared[joint][1][figure.removeprefix(COUPLED)] = found
+        if figure in OF_COUPLINGS:
+            shared[joint][1][OF_COUPLINGS[figure]] = found
             continue
         parts[figure][joint] = found
         if figure == deciding and not reason:

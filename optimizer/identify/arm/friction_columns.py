@@ -12,8 +12,11 @@ import numpy as np
 
 from joulepath.models.robot import Array
 
-COUPLED = "coupling."
-"""Prefix of a term of a coupling; the number of the coupling then replaces that of the joint."""
+COUPLED = {term: f"coupling.{term}" for term in ("coulomb", "viscous", "rotor_inertia")}
+"""Names of the terms of a coupling by those of a joint; the number of the coupling then replaces
+that of the joint."""
+OF_COUPLINGS = {name: term for term, name in COUPLED.items()}
+"""Terms of a joint by the names of those of a coupling."""
 SENSOR_COULOMB = "sensor_coulomb"
 """Coulomb friction behind a torque sensor at a link."""
 SENSOR_VISCOUS = "sensor_viscous"

@@ -15,7 +15,7 @@ import numpy as np
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.dynamics.link_regressor import body_parameters
 from joulepath.optimizer.identify.arm.base_parameters import BaseParameters, base_parameters
-from joulepath.optimizer.identify.arm.friction_columns import COUPLED, lower_bounds
+from joulepath.optimizer.identify.arm.friction_columns import OF_COUPLINGS, lower_bounds
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.estimates.grouped import (
     GroupedEquations,
@@ -126,7 +126,7 @@ class BaseTerms:
                 values of.
         """
         judged = judged & np.array(
-            [term != "offset" and not term.startswith(COUPLED) for term, _ in self.names]
+            [term != "offset" and term not in OF_COUPLINGS for term, _ in self.names]
         )
         absurd = impossible(self.names, value)
         sd = np.where(absurd, np.inf, sd)

@@ -13,14 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Robot
-from joulepath.models.uncertainty.parameters import LINKS
 from joulepath.optimizer.dynamics.link_regressor import body_parameters
 from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric
 from joulepath.optimizer.identify.estimates.estimate import Estimate
 from joulepath.optimizer.identify.estimates.grouped import GroupedEquations, leave_one_out
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
 from joulepath.optimizer.identify.fits.determined import with_reasons
-from joulepath.optimizer.identify.fits.whole_fit import LINK
+from joulepath.optimizer.identify.fits.whole_fit import LINK_NAMES
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters, effective_weights
 from joulepath.optimizer.identify.rows.fit_rows import Rows
@@ -68,7 +67,7 @@ def fit_wrench(
         value = solve_consistent(gram, moment, robot.nq, np.full(len(own), -np.inf))
     root = np.linalg.solve(gram, np.linalg.cholesky(precision))
     found = Estimate(
-        names=tuple((LINK + part, joint) for joint in range(robot.nq) for part in LINKS),
+        names=tuple((name, joint) for joint in range(robot.nq) for name in LINK_NAMES),
         value=value,
         replicates=leave_one_out(
             grouped, value, np.ones(len(own), dtype=bool), precision

@@ -12,6 +12,7 @@ from joulepath.models.robot import Array, FrictionLaw, Mask, Robot
 from joulepath.optimizer.identify.arm.friction_columns import (
     COUPLED,
     LAW_TERMS,
+    OF_COUPLINGS,
     SENSOR_COULOMB,
     column,
     deciding_term,
@@ -151,9 +152,9 @@ def joint_block(data: TorqueData, joints: Sequence[int], speed: Array | None = N
     couplings = [
         (k, each) for k, each in enumerate(options.couplings) if set(each.joints) <= set(joints)
     ]
-    coupled = [term for term in terms if term in ("coulomb", "viscous", "rotor_inertia")]
+    coupled = [term for term in terms if term in COUPLED]
     names = [(term, joint) for joint in joints for term in terms]
-    names += [(COUPLED + term, k) for k, _ in couplings for term in coupled]
+    names += [(COUPLED[term], k) for k, _ in couplings for term in coupled]
     speed = robot.friction.speed if speed is None else speed
     own = np.array([own_value(robot, name) for name in names])
     parts = list[tuple[Array, Array, int, IntArray, Array]]()
@@ -277,7 +278,7 @@ def weighted_solution(block: JointBlock, data: TorqueData) -> tuple[Array, Array
 def own_value(robot: Robot, name: Name) -> float:
     """The robot's own value of a term; 0 for a term without one."""
     term, joint = name
-    if joint is None or term.startswith(COUPLED):
+    if joint is None or term in OF_COUPLINGS:
         return 0.0
     if term == SCALE:
         return 1.0

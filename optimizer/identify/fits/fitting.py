@@ -33,7 +33,7 @@ from joulepath.optimizer.identify.fits.power_fit import (
     power_prior,
 )
 from joulepath.optimizer.identify.fits.torque_fit import fit_torques
-from joulepath.optimizer.identify.fits.whole_fit import LINK, fit_whole
+from joulepath.optimizer.identify.fits.whole_fit import LINK_NAMES, fit_whole
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import MeasuredNoise
 from joulepath.optimizer.identify.rows.clusters import Clusters, clusters_of
@@ -135,7 +135,7 @@ def _with_torque(
         found = fit(data)
     if rows.link_side:
         found = with_doubts_about_side(found, own_robot)
-    of_links = np.array([joint is None or name.startswith(LINK) for name, joint in found.names])
+    of_links = np.array([joint is None or name in LINK_NAMES for name, joint in found.names])
     named = zip(found.names, found.reasons, of_links.tolist(), strict=True)
     terms = {name: reason for name, reason, of_link in named if not of_link}
     matrix, before = _link_changes(robot, options)

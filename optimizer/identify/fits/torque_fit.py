@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from joulepath.models.robot import Array, Mask, Robot
-from joulepath.optimizer.identify.arm.friction_columns import COUPLED
+from joulepath.optimizer.identify.arm.friction_columns import OF_COUPLINGS
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join_estimates
 from joulepath.optimizer.identify.estimates.grouped import RANK, GroupedEquations, column_lengths
 from joulepath.optimizer.identify.fits.block import (
@@ -84,7 +84,7 @@ def _with_torque_constants(robot: Robot, found: Estimate) -> Estimate:
     The torques of the fit were computed with the robot's own constants.
     """
     joints = [
-        joint if joint is not None and not name.startswith(COUPLED) else 0
+        joint if joint is not None and name not in OF_COUPLINGS else 0
         for name, joint in found.names
     ]
     scale_at = [found.names.index((SCALE, joint)) for joint in joints]

@@ -15,7 +15,7 @@ import numpy as np
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.models.uncertainty.parameters import LINKS
 from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
-from joulepath.optimizer.identify.arm.friction_columns import COUPLED, SENSOR_GAIN
+from joulepath.optimizer.identify.arm.friction_columns import OF_COUPLINGS, SENSOR_GAIN
 from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.estimates.grouped import GroupedEquations
@@ -36,8 +36,8 @@ from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression, whol
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters, effective_weights
 
-LINK = "inertials."
-LINK_NAMES = frozenset(LINK + part for part in LINKS)
+LINK_NAMES = {f"inertials.{part}": k for k, part in enumerate(LINKS)}
+"""Names of the parameters of a link, with their places in `LINKS`."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def _estimate(
     """The estimate of friction, rotors and couplings, then of the links."""
     count, bodies = len(solution.value), len(solution.value) - len(terms)
     order = np.r_[bodies:count, :bodies]
-    names = (*terms, *((LINK + part, joint) for joint in range(robot.nq) for part in LINKS))
+    names = (*terms, *((name, joint) for joint in range(robot.nq) for name in LINK_NAMES))
     found = Estimate(
         names=names,
         value=solution.value[order],
@@ -200,7 +200,7 @@ def _prior_sd(robot: Robot, name: Name, own: float) -> float:
         return WHOLE_FIT.gain_sd
     if term == "offset" and joint is not None:
         return WHOLE_FIT.offset_sd * float(robot.limits.tau_max[joint])
-    known = own > 0 and not term.startswith(COUPLED)
+    known = own > 0 and term not in OF_COUPLINGS
     return WHOLE_FIT.relative_sd * own if known else WHOLE_FIT.default_sd
 
 

@@ -9,14 +9,13 @@ from collections.abc import Set as AbstractSet
 import numpy as np
 
 from joulepath.models.robot import Array, Mask, Robot
-from joulepath.models.uncertainty.parameters import LINKS
 from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm, own_arm
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.fits.base_fit import BaseTerms
 from joulepath.optimizer.identify.fits.block import own_value
 from joulepath.optimizer.identify.fits.fitting import LINK_MASS_SCALE, FitResult
-from joulepath.optimizer.identify.fits.whole_fit import LINK, LINK_NAMES
+from joulepath.optimizer.identify.fits.whole_fit import LINK_NAMES
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.quality.interval import Spread
 from joulepath.optimizer.identify.quality.structure import inertials_of
@@ -158,7 +157,7 @@ def _identified(nq: int, name: str, told: AbstractSet[Name], replaced: Mask | bo
     """
     if name == "idle_power":
         return np.array((name, None) in told)
-    parts = {LINK + part for part in LINKS} if name in INERTIALS else {name}
+    parts = set(LINK_NAMES) if name in INERTIALS else {name}
     found = np.array([any((part, joint) in told for part in parts) for joint in range(nq)])
     if name in INERTIALS:
         return np.asarray(found | ((LINK_MASS_SCALE, None) in told))
@@ -175,8 +174,8 @@ def _covariance_rows(robot: Robot, fitted: FitResult) -> Iterator[tuple[Name, Ar
             continue
         bodies = body_parameters(robot.model).reshape(-1, PARAMETERS_PER_BODY).tolist()
         for joint, body in enumerate(bodies):
-            for part, own in zip(LINKS, body, strict=True):
-                yield (LINK + part, joint), own * row
+            for part, own in zip(LINK_NAMES, body, strict=True):
+                yield (part, joint), own * row
 
 
 def parameters_of(
@@ -199,10 +198,10 @@ def parameters_of(
 def _own_value(robot: Robot, name: Name) -> float:
     """The robot's own value of any figure."""
     figure, joint = name
-    if figure.startswith(LINK):
+    if figure in LINK_NAMES:
         assert joint is not None
-        part = LINKS.index(figure.removeprefix(LINK))
-        return float(body_parameters(robot.model).reshape(-1, PARAMETERS_PER_BODY)[joint, part])
+        own = body_parameters(robot.model).reshape(-1, PARAMETERS_PER_BODY)
+        return float(own[joint, LINK_NAMES[figure]])
     if figure == LINK_MASS_SCALE:
         return 1.0
     if figure == "idle_power":
