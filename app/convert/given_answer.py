@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -22,11 +23,22 @@ from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cycle import CYCLE_RANGES
 
-MOST_KNOTS = 4096
-HIGHEST_DEGREE = 31
-LONGEST_REST = CYCLE_RANGES.longest
-# of a stop: a move, two lines, a path, a dwell and a wait
-MOST_LEGS = 6 * CYCLE_RANGES.max_stops + 5
+
+@dataclass(frozen=True)
+class GivenAnswerLimits:
+    """Limits of answers that callers send back, far above those of any answer."""
+
+    knots: int = 4096
+    """Most knots of a spline."""
+    degree: int = 31
+    """Highest degree of a spline."""
+    rest: float = CYCLE_RANGES.longest
+    """Longest dwell or wait [s]."""
+    legs: int = 6 * CYCLE_RANGES.max_stops + 5
+    """Most legs: of a stop a move, two lines, a path, a dwell and a wait."""
+
+
+LIMITS = GivenAnswerLimits()
 MOVING = ("move", "line", "path")
 Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 _Row = Annotated[list[Number], Field(min_length=1, max_length=16)]
@@ -39,9 +51,9 @@ class Part(BaseModel):
 
 
 class _Spline(Part):
-    degree: Annotated[int, Field(ge=1, le=HIGHEST_DEGREE)]
-    knots: Annotated[list[Number], Field(min_length=4, max_length=MOST_KNOTS)]
-    control_points: Annotated[list[_Row], Field(min_length=2, max_length=MOST_KNOTS)]
+    degree: Annotated[int, Field(ge=1, le=LIMITS.degree)]
+    knots: Annotated[list[Number], Field(min_length=4, max_length=LIMITS.knots)]
+    control_points: Annotated[list[_Row], Field(min_length=2, max_length=LIMITS.knots)]
 
 
 class _Samples(Part):
@@ -85,7 +97,7 @@ class _Leg(Part):
     kind: Literal["move", "line", "path", "dwell", "wait"]
     start: _Stop
     goal: _Stop
-    duration: Annotated[float, Field(ge=0, le=LONGEST_REST)]
+    duration: Annotated[float, Field(ge=0, le=LIMITS.rest)]
     answer: str | None
 
 
@@ -93,7 +105,7 @@ class _Cycle(Part):
     """An answer of `POST /cycle`."""
 
     robot: RobotName
-    legs: Annotated[list[_Leg], Field(min_length=1, max_length=MOST_LEGS)]
+    legs: Annotated[list[_Leg], Field(min_length=1, max_length=LIMITS.legs)]
 
 
 _A_FRONT = "points"
