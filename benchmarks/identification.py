@@ -13,9 +13,8 @@
   some minutes; fewer runs have a margin for their sampling error.
 - `cycles`: share of the energies of cycles between P5 and P95, in another log of a simulated UR10e,
   for moves with an additional random power.
-- `standins`: simulated logs in place of real logs that are not public: another motion of the same
-  day and other days of a UR10e, a payload from two logs of different days, and halves of a log of a
-  Panda.
+- `standins`: simulated logs in place of real ones that are not public: another motion of the day
+  and other days of a UR10e, a payload from logs of two days, and halves of a log of a Panda.
 - `speed`: processor time to read a log of 41 s and to identify the arm.
 - `outsider`: errors of torques of held-out motions of a real UR10e and two Pandas, relative to the
   errors of an ordinary least-squares fit without knowledge of the links.
