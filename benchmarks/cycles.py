@@ -87,7 +87,7 @@ def poses(rng: np.random.Generator, count: int) -> list[Pose]:
     return found
 
 
-def rounds(
+def random_cycles(
     seed: int,
     count: int,
     stops: int,
@@ -204,12 +204,12 @@ def main() -> None:
     on_one_core()
     compile_kernel(load_robot("ur5e"))
     # loads everything that is loaded once, so that the first cycle does not pay for it
-    plan_cycle(next(rounds(given.seed + 1, 1, 1, given.deadline)))
+    plan_cycle(next(random_cycles(given.seed + 1, 1, 1, given.deadline)))
     found: dict[str, list[float]] = {}
     optimal = legs = certified = 0
     how = (given.passes, given.free, given.dwell, given.anywhere, given.turned)
     size = (given.seed, given.count, given.stops, given.deadline)
-    for asked in rounds(*size, *how):
+    for asked in random_cycles(*size, *how):
         free = None if given.time is None else plan_cycle(asked)
         if free is not None:
             asked = in_time(asked, free, given.time)

@@ -87,7 +87,7 @@ def plan_cycle(
             `tell` is given.
 
     Returns:
-        The moves in order, their energy, a lower bound, and other ways to go round.
+        The moves in order, their energy, a lower bound, and other ways through the stops.
 
     Raises:
         NoSequence: no chain of configurations leads over all stops.

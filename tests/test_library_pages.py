@@ -100,7 +100,7 @@ def test_the_snippet_prints_what_the_readme_says() -> None:
 
 
 @pytest.mark.long
-def test_the_snippet_of_the_cycles_page_goes_round() -> None:
+def test_the_snippet_of_the_cycles_page_runs() -> None:
     (code,) = re.findall(
         r"```python\n(.*?)```", (ROOT / "docs" / "reference" / "cycle.md").read_text(), re.DOTALL
     )

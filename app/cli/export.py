@@ -31,8 +31,8 @@ Examples:
   joulepath optimize request.json --output answer.json
   joulepath export urscript answer.json --speed-scale 0.1 --output slowly.script
   joulepath export ros2 answer.json --set message=trajectory > trajectory.yaml
-  joulepath cycle round.json --answers moves --output answer.json
-  joulepath export urscript answer.json --answers moves --output round.script"""
+  joulepath cycle cycle.json --answers moves --output answer.json
+  joulepath export urscript answer.json --answers moves --output cycle.script"""
 )
 @click.argument("format", type=click.Choice(FORMAT_NAMES))
 @FILE

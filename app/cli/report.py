@@ -46,7 +46,7 @@ class _Sourced(click.ParamType[dict[str, Any], Any]):
     epilog="""\b
 Examples:
   joulepath report request.json --output report.html
-  joulepath report round.json --price 0.2:contract --shifts-per-year 460 --output report.pdf
+  joulepath report cycle.json --price 0.2:contract --shifts-per-year 460 --output report.pdf
   joulepath report log.csv --robot ur10e --output log.pdf
   echo '{"job": "9a1c2f04-6f0f-4d55-8d7e-3f2b8f7c1e60"}' | joulepath report - --output job.pdf"""
 )

@@ -95,7 +95,7 @@ def write_answers(result: TaskResult, folder: Path) -> None:
 
 
 def proof(answer: dict[str, Any]) -> dict[str, str]:
-    """The lines on the duration of a motion or round, and on how near its energy is to the
+    """The lines on the duration of a motion or cycle, and on how near its energy is to the
     least."""
     energy = answer["energy"]
     return {

@@ -52,7 +52,7 @@ class FreeEndsSettings:
     pairs_at_once: int = 3000
     """Pairs of cells that get the bound of their displacement at once."""
     tightenings: int = 4
-    """Most rounds of tightening in one iteration."""
+    """Most passes of tightening in one iteration."""
     most_iterations: int = 24
     """Most iterations."""
     enough: float = 0.99

@@ -91,7 +91,7 @@ def in_the_middle(page: Page) -> None:
 
 
 def of_cells(page: Page) -> None:
-    """A move, the same with changes, a round, and its export."""
+    """A move, the same with changes, a cycle, and its export."""
     in_the_middle(page)
     picture(page, "studio")
     type_into(page, "/payload/mass", "1.6")
@@ -103,7 +103,7 @@ def of_cells(page: Page) -> None:
     expect(page.locator("#targets")).not_to_contain_text("checking")
     page.locator("#scrub").fill("2.4")
     page.mouse.move(0, 0)
-    picture(page, "studio_round")
+    picture(page, "studio_cycle")
     page.locator("#export").click()
     page.locator("#preview").wait_for()
     picture(page, "studio_export")
@@ -111,7 +111,7 @@ def of_cells(page: Page) -> None:
 
 
 def of_places(page: Page) -> None:
-    """The map of a round between two tables, at its best place."""
+    """The map of a cycle between two tables, at its best place."""
     page.get_by_label("Name of the project").fill("Two tables")
     ask(page, json.loads((ROOT / "examples/placement/two_tables.json").read_text())["cycle"])
     search_places(page, 300, 120)

@@ -137,7 +137,7 @@ def test_prices_and_times_that_are_none_are_refused_where_they_stand(page: Page)
     every.fill("")
     every.press("Enter")
     expect(part_of(every).locator(".error")).to_have_count(0)
-    assert state(page, "economics.cycle") is None
+    assert state(page, "economics.cycleTime") is None
 
 
 def test_what_the_service_cannot_tell_is_said_where_it_is_missing(
@@ -197,12 +197,12 @@ def test_a_file_that_is_no_log_is_told_at_the_file(page: Page, tmp_path: Path) -
     go(page, "Cell")
 
 
-def test_a_round_has_its_stops_again_after_a_look_at_one_move(page: Page) -> None:
+def test_a_cycle_has_its_stops_again_after_a_look_at_one_move(page: Page) -> None:
     poses = [FIRST["goal"], FIRST["start"]]
     stops = [{"name": f"shelf {k}", "target": pose} for k, pose in enumerate(poses)]
     fill_json(page, {"start": FIRST["start"], "stops": stops, "closed": True})
     show_json(page, False)
     before = state(page, "request")
-    for kind in ("Move", "Round"):
+    for kind in ("Move", "Cycle"):
         page.get_by_role("radio", name=kind, exact=True).click()
     assert state(page, "request") == before

@@ -41,7 +41,7 @@ EQUAL = 1e-3
 """Relative difference of an energy that was computed twice: at a place of the map, the arm
 configurations are only likely the best, so the second one may be lower."""
 DOWN = {"position": [0.5, 0.0, 0.4], "rotvec": [3.1416, 0, 0]}
-ROUND: dict[str, Any] = json.loads((ROOT / "examples/placement/two_tables.json").read_text())[
+CYCLE: dict[str, Any] = json.loads((ROOT / "examples/placement/two_tables.json").read_text())[
     "cycle"
 ]
 EVERY_FORM: dict[str, Any] = {
@@ -115,7 +115,7 @@ def found(browser: Browser, service: Server) -> Iterator[Page]:
     """The page with a map of nine places, one of them the robot's own."""
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
-        ask(page, ROUND)
+        ask(page, CYCLE)
         search_places(page, 100, 30)
         expect(page.locator("#progress-text")).to_contain_text("s left")
         until(page, "() => studio.state.mapShown")

@@ -101,8 +101,8 @@ def test_a_programmer_takes_a_program_to_the_controller(browser: Browser, servic
         assert "servoj" in program and re.search(r"payload.* 4 kg", program)
 
 
-def test_a_programmer_makes_a_round_of_a_table(browser: Browser, service: Server) -> None:
-    """Stops are pasted, ordered, duplicated and deleted; the round is exported as plain moves."""
+def test_a_programmer_makes_a_cycle_of_a_table(browser: Browser, service: Server) -> None:
+    """Stops are pasted, ordered, duplicated and deleted; the cycle is exported as plain moves."""
     rows = [
         "pick;450;-250;150;0;3.142;0",
         "place;100;500;250;0;3.142;0",

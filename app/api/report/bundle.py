@@ -67,7 +67,7 @@ class Bundle:
         return {
             "optimize": "motion",
             "cycle": "cycle",
-            "job": "round",
+            "job": "run",
             "evaluate": "log",
             "placement": "cycle",
         }[self.kind]

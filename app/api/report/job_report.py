@@ -73,7 +73,7 @@ def job_report(bundle: Bundle) -> Report:
         ),
         costs=cost_table(bundle, money),
         currency=money.currency,
-        costs_note=f"A round is all moves of the table once. {costs_note(money)}",
+        costs_note=f"A run is all moves of the table once. {costs_note(money)}",
         proven_title="Proven",
         proven=unbroken(_proven(rows)),
         check=bundle.how_to_check(None),

@@ -16,7 +16,7 @@ const change: Change = {
 const way = (energy: number, duration = 1) => ({ energy, duration });
 
 it("every change says its joules", () => {
-  expect(wordsOf(change)).toBe("A round from the last stop: 607 J in 11.4 s, 20 % less.");
+  expect(wordsOf(change)).toBe("A cycle from the last stop: 607 J in 11.4 s, 20 % less.");
   expect(wordsOf({ ...change, name: "brakes", share: 0.0533 })).toMatch(
     /stands: 607 J, 5.3 % less/,
   );
@@ -31,7 +31,7 @@ it("a saving is one of the cycle where the motion waits", () => {
   expect(ofCycle(1 - 94 / 93, way(74), way(93, 1.5), 100)).toBeCloseTo(-1 / 173);
 });
 
-it("a motion waits that is shorter than its cycle and has no wait of its own", () => {
+it("a motion waits that is shorter than its cycle time and has no wait of its own", () => {
   const shown = (asked: ApiRequest) => ({ asked, solution: { duration: 2 } }) as Answered;
   expect(waits(shown({}), 6)).toBe(true);
   expect(waits(shown({ dwell: null }), 6)).toBe(true);

@@ -4,7 +4,7 @@ import type { Baseline } from "../src/store/types";
 
 const way = (more: Partial<Baseline>) => more as Baseline;
 
-it("a way of a round says which move breaks what, each limit once", () => {
+it("a way of a cycle says which move breaks what, each limit once", () => {
   const broken = [
     { start: "start", goal: "pick", reason: "unbounded jerk" },
     { start: "pick", goal: "place", reason: "unbounded jerk; post and wrist are 3 mm too close" },

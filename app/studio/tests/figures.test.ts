@@ -62,7 +62,7 @@ it("costs are those of whole cycles in a shift", () => {
 
 it("one motion begins as often as it comes, and a request with a wait says it itself", () => {
   const shown = (asked: ApiRequest) => ({ asked, solution: { duration: 2 } }) as Answered;
-  expect([null, 1, 6].map((cycle) => periodOf(shown({}), cycle))).toEqual([2, 2, 6]);
+  expect([null, 1, 6].map((every) => periodOf(shown({}), every))).toEqual([2, 2, 6]);
   expect(periodOf(shown({ time: { max: 4 } }), 6)).toBe(6);
   expect(periodOf(shown({ dwell: { time: 3 } }), 6)).toBe(3);
 });
@@ -191,8 +191,8 @@ it("what the service says has the units and the names of the page", () => {
 
 it("a problem stands at the places that it names", () => {
   const stops = [{ name: "bin" }, { name: "bead/2" }, {}];
-  const round = { ...MOVE, stops } as ApiRequest;
-  const at = (details: ProblemDetails, asked = round) => {
+  const cycle = { ...MOVE, stops } as ApiRequest;
+  const at = (details: ProblemDetails, asked = cycle) => {
     tell(new Problem({ title: "No", detail: "Why.", ...details }), asked);
     return trouble.value!.fields.map(({ pointer }) => pointer);
   };

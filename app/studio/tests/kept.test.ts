@@ -102,7 +102,7 @@ it("a kept answer that this browser has not asked for comes back as it was typed
   vi.stubGlobal("fetch", () => Promise.resolve(Response.json(kept)));
   await openKept("answer-9");
   expect([request.value, typed.value]).toEqual([MOVE, { "/payload/mass": "0,80" }]);
-  kept.request = kept.typed = null; // a move of a round
+  kept.request = kept.typed = null; // a move of a cycle
   await openKept("/answers/answer-9");
   expect(request.value).toEqual({ robot: "ur5e", ...branch });
   expect(typed.value).toEqual({});
@@ -138,7 +138,7 @@ it("a file holds a project or a request", () => {
 
 it("a file of another program or version is opened as far as it holds a project", () => {
   const price = { value: 0.3, source: "yours" };
-  const { cycle, carbon, ...defaults } = DEFAULT_ECONOMICS;
+  const { cycleTime, carbon, ...defaults } = DEFAULT_ECONOMICS;
   const read = cellOf(
     JSON.stringify({
       name: 5,
@@ -150,8 +150,11 @@ it("a file of another program or version is opened as far as it holds a project"
   expect(read).toEqual({
     request: MOVE,
     typed: { "/goal/pose/position/2": "450,0" },
-    economics: { ...defaults, cycle, carbon, price },
+    economics: { ...defaults, cycleTime, carbon, price },
   });
+  // the cycle time had another name once
+  const old = { ...defaults, carbon, price, cycle: 6 };
+  expect(cellOf(JSON.stringify({ request: MOVE, economics: old })).economics?.cycleTime).toBe(6);
   for (const typed of [3, null, ["a"]])
     expect(cellOf(JSON.stringify({ request: MOVE, typed, economics: typed }))).toEqual({
       request: MOVE,

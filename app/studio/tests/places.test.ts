@@ -1,7 +1,7 @@
 import { beforeEach, describe, expect, it, vi } from "vitest";
 import { IDENTITY, inverse, multiply, ofPose } from "../src/store/chain";
 import { put } from "../src/store/pointer";
-import { accept, regionOf, regionTyped, roundOf, search } from "../src/store/placement";
+import { accept, regionOf, regionTyped, cycleOf, search } from "../src/store/placement";
 import { columnsOf, coordinatesOf, movedTo, pitchOf, worldOf, yawOf } from "../src/store/places";
 import type { Place } from "../src/store/places";
 import { seenFrom } from "../src/store/seenFrom";
@@ -134,17 +134,17 @@ describe("what is sent", () => {
   ])("or says what is wrong with %o", (wrong, why) => {
     expect((regionOf({ ...given, ...wrong }, 0) as { why: string }).why).toContain(why);
   });
-  it("is a round of one stop for a move, with its time and its wait", () => {
-    const round = roundOf({ ...MOVE, dwell: { time: 6, hold: "brakes" } });
-    expect([round.closed, round.time, round.wait, round.hold]).toEqual([
+  it("is a cycle of one stop for a move, with its time and its wait", () => {
+    const cycle = cycleOf({ ...MOVE, dwell: { time: 6, hold: "brakes" } });
+    expect([cycle.closed, cycle.time, cycle.wait, cycle.hold]).toEqual([
       false,
       6,
       "goal",
       { hold: "brakes" },
     ]);
-    expect(round.stops).toEqual([{ name: "goal", target: MOVE.goal }]);
-    expect(roundOf({ ...MOVE, duration: { max: 2 } }).time).toEqual({ max: 2 });
-    expect(roundOf(round)).toBe(round);
+    expect(cycle.stops).toEqual([{ name: "goal", target: MOVE.goal }]);
+    expect(cycleOf({ ...MOVE, duration: { max: 2 } }).time).toEqual({ max: 2 });
+    expect(cycleOf(cycle)).toBe(cycle);
   });
 });
 
@@ -173,17 +173,17 @@ describe("a look at a place", () => {
     expect([request.value, answered.value, stale.value]).toEqual([MOVE, before, false]);
   });
   it.each([
-    ["which was placed as a round of this move alone", MOVE, "answers/move"],
-    ["which its wait made another round of", { ...MOVE, dwell: { time: 6 } }, "optimize"],
+    ["which was placed as a cycle of this move alone", MOVE, "answers/move"],
+    ["which its wait made another cycle of", { ...MOVE, dwell: { time: 6 } }, "optimize"],
   ])("at the best place shows the move, %s", async (_, asked, last) => {
     const sent: string[] = [];
     const base = { position: [0.1, 0, 0] };
-    const best = { base, mount: null, energy: 1, cycles: [{ answer: "answers/round" }] };
+    const best = { base, mount: null, energy: 1, cycles: [{ answer: "answers/cycle" }] };
     const legs = [{ answer: "answers/move" }, ...("dwell" in asked ? [{ answer: null }] : [])];
     const move = { id: null, robot: "ur5e", objective: "electrical" };
     const answers: Record<string, unknown> = {
       placement: { id: null, best, nominal: null, map: [] },
-      "answers/round": { answer: { legs } },
+      "answers/cycle": { answer: { legs } },
       "answers/move": { answer: { ...move, energy: { electrical: { total: 1 } } } },
       optimize: { ...move, energy: { electrical: { total: 1 } } },
     };

@@ -26,8 +26,8 @@ import type { ApiRequest, Pose, Robot } from "../src/store/types";
 import { withTime } from "../src/task/TimeField";
 import { MOVE } from "./cells";
 
-const round = withStop(
-  withStop(asKind(MOVE, "round"), { q: [1, 2, 3, 4, 5, 6] }, "pick 1"),
+const cycle = withStop(
+  withStop(asKind(MOVE, "cycle"), { q: [1, 2, 3, 4, 5, 6] }, "pick 1"),
   null,
   "pick 1",
 );
@@ -36,28 +36,28 @@ const row = (request: ApiRequest, name: string) =>
   rowsOf(request).find((each) => each.name === name)!;
 
 describe("kinds", () => {
-  it("a move with a stop becomes a round that ends in it", () => {
-    expect(kindOf(round)).toBe("round");
-    expect(names(round)).toEqual(["Start", "goal", "pick 1", "pick 2"]);
-    expect("goal" in round).toBe(false);
+  it("a move with a stop becomes a cycle that ends in it", () => {
+    expect(kindOf(cycle)).toBe("cycle");
+    expect(names(cycle)).toEqual(["Start", "goal", "pick 1", "pick 2"]);
+    expect("goal" in cycle).toBe(false);
   });
-  it("and a round a move to its last stop", () => {
-    const back = asKind(round, "move");
+  it("and a cycle a move to its last stop", () => {
+    const back = asKind(cycle, "move");
     expect(back.goal).toEqual({ q: [1, 2, 3, 4, 5, 6] });
-    expect(asKind(asKind(MOVE, "round"), "move")).toEqual(MOVE);
+    expect(asKind(asKind(MOVE, "cycle"), "move")).toEqual(MOVE);
   });
-  it("a round comes back with its stops, and ends where the move ended", () => {
-    const { stops } = round;
-    const back = asKindAgain(asKind(round, "move"), "round", ownFields(round));
-    expect(back).toEqual(round);
-    const other = { ...asKind(round, "move"), goal: { q: [6, 5, 4, 3, 2, 1] } };
-    const moved = asKindAgain(other, "round", ownFields(round)).stops!;
+  it("a cycle comes back with its stops, and ends where the move ended", () => {
+    const { stops } = cycle;
+    const back = asKindAgain(asKind(cycle, "move"), "cycle", ownFields(cycle));
+    expect(back).toEqual(cycle);
+    const other = { ...asKind(cycle, "move"), goal: { q: [6, 5, 4, 3, 2, 1] } };
+    const moved = asKindAgain(other, "cycle", ownFields(cycle)).stops!;
     expect(moved.map(({ name }) => name)).toEqual(stops!.map(({ name }) => name));
     expect(moved[1]!.target).toEqual(other.goal);
   });
   it("a move comes back with its time", () => {
     const timed = { ...MOVE, duration: 3 };
-    const back = asKindAgain(asKind(timed, "round"), "move", ownFields(timed));
+    const back = asKindAgain(asKind(timed, "cycle"), "move", ownFields(timed));
     expect(back).toEqual(timed);
   });
   it("a path keeps its ends", () => {
@@ -68,7 +68,7 @@ describe("kinds", () => {
 
 describe("stops", () => {
   it("are duplicated under names of their own", () => {
-    expect(names(duplicated(round, row(round, "pick 1")))).toEqual([
+    expect(names(duplicated(cycle, row(cycle, "pick 1")))).toEqual([
       "Start",
       "goal",
       "pick 1",
@@ -77,17 +77,17 @@ describe("stops", () => {
     ]);
   });
   it("are moved and deleted", () => {
-    expect(names(moved(round, row(round, "pick 2"), -1))).toEqual([
+    expect(names(moved(cycle, row(cycle, "pick 2"), -1))).toEqual([
       "Start",
       "goal",
       "pick 2",
       "pick 1",
     ]);
-    expect(moved(round, row(round, "goal"), -1).stops).toEqual(round.stops);
-    expect(names(withoutRow(round, row(round, "goal")))).toEqual(["Start", "pick 1", "pick 2"]);
+    expect(moved(cycle, row(cycle, "goal"), -1).stops).toEqual(cycle.stops);
+    expect(names(withoutRow(cycle, row(cycle, "goal")))).toEqual(["Start", "pick 1", "pick 2"]);
   });
   it("what lacks is told", () => {
-    expect(lackOf(round)?.text).toContain("pick 2 is empty");
+    expect(lackOf(cycle)?.text).toContain("pick 2 is empty");
     expect(lackOf(MOVE)).toBeNull();
     expect(lackOf(put(MOVE, "/goal", undefined))?.pointer).toBe("/goal");
   });
@@ -139,7 +139,7 @@ it("obstacles have names of their own", () => {
 });
 
 it("names that a table or a file gives stay as they are", () => {
-  const listed = withStop(withStop(asKind(MOVE, "round"), null, "press"), null, "press");
+  const listed = withStop(withStop(asKind(MOVE, "cycle"), null, "press"), null, "press");
   expect(names(listed).slice(-2)).toEqual(["press", "press 2"]);
 });
 
@@ -153,14 +153,14 @@ it("a mesh file larger than any fixture in metres is one in millimetres", async 
   expect(await read("solid empty\nendsolid empty\n").catch(() => null)).toBeNull();
 });
 
-it("a move keeps its branches at its goal as a round, and has its own turns again as a move", () => {
+it("a move keeps its branches at its goal as a cycle, and has its own turns again as a move", () => {
   const branch = { wrist: "no_flip" };
   const move = { ...MOVE, branch, windings: false };
-  const round = asKind(move, "round");
-  expect(round.stops).toEqual([{ name: "goal", target: MOVE.goal, branch }]);
-  expect(round.branch).toEqual(branch);
-  expect("windings" in round).toBe(false);
-  expect(asKindAgain(round, "move", ownFields(move))).toEqual(move);
+  const cycle = asKind(move, "cycle");
+  expect(cycle.stops).toEqual([{ name: "goal", target: MOVE.goal, branch }]);
+  expect(cycle.branch).toEqual(branch);
+  expect("windings" in cycle).toBe(false);
+  expect(asKindAgain(cycle, "move", ownFields(move))).toEqual(move);
 });
 
 const robot = (name: string, low: number[], high: number[], example_move: unknown = null) =>
@@ -206,7 +206,7 @@ it("a held speed of the TCP is its least one too, and keeps its ramps", () => {
 it("another kind of time begins with the seconds of before", () => {
   expect(withTime(MOVE, "exact", null, 1.234).duration).toBe(1.24);
   expect(withTime(MOVE, "most", 8).duration).toEqual({ max: 2 });
-  expect(withTime(MOVE, "cycle", 8, 1.2).dwell).toEqual({ time: 8 });
-  expect(withTime({ ...round, time: 5 }, "most", 8, 4).time).toEqual({ max: 5 });
+  expect(withTime(MOVE, "period", 8, 1.2).dwell).toEqual({ time: 8 });
+  expect(withTime({ ...cycle, time: 5 }, "most", 8, 4).time).toEqual({ max: 5 });
   expect(withTime({ ...MOVE, dwell: { time: 6 } }, "free", null)).toEqual(MOVE);
 });

@@ -121,9 +121,9 @@ it("differences are named as the page names them", () => {
 });
 
 it("prices stay for another cell, and how often a motion came does not", () => {
-  economics.value = { ...economics.value, cycle: 8, shift: 7 };
+  economics.value = { ...economics.value, cycleTime: 8, shift: 7 };
   replaceCell({ project: { id: "2", name: "other" }, request: MOVE });
-  expect(economics.value).toMatchObject({ cycle: null, shift: 7 });
+  expect(economics.value).toMatchObject({ cycleTime: null, shift: 7 });
 });
 
 it("changed times and speeds are told with their units", () => {

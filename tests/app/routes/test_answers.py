@@ -101,13 +101,13 @@ def test_the_answers_are_listed(recorded: TestClient) -> None:
         "location"
     ]
     step = recorded.post(f"{study}/iterations", json={"evaluate": given}).json()
-    round_ = {
+    asked = {
         "start": {"q": HOME},
         "stops": [{"target": {"q": NEAR}}],
         "candidates": "none",
         **PATIENT,
     }
-    cycle_job = recorded.post("/cycle", json=round_, headers={"Prefer": "respond-async, wait=60"})
+    cycle_job = recorded.post("/cycle", json=asked, headers={"Prefer": "respond-async, wait=60"})
     assert cycle_job.status_code == 200
     pages, query = [], "/answers?limit=2"
     for _ in range(3):
@@ -145,8 +145,8 @@ def test_answers_have_names_and_are_found(recorded: TestClient) -> None:
     own = recorded.post("/optimize", json=move()).json()["id"]
     path = sent(recorded, [optimization(1.5)])
     ended(recorded, path)
-    round_ = {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], **PATIENT}
-    cycle = recorded.post("/cycle", json=round_).json()
+    asked = {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], **PATIENT}
+    cycle = recorded.post("/cycle", json=asked).json()
     renamed = recorded.patch(f"/answers/{own}", json={"name": tray})
     assert renamed.status_code == 200 and renamed.json()["name"] == tray
 

@@ -34,7 +34,7 @@ LINES = {
     "limits": {"velocity": 1.5, "tcp_speed": 0.5},
     "obstacles_ignored": ["box"],
 }
-ROUND = {
+CYCLE = {
     "start": {"q": HOME},
     "stops": [
         {"name": EVIL, "target": {"q": NEAR}, "payload": LOAD, "dwell": 0.2, **LINES},
@@ -108,7 +108,7 @@ def test_a_slow_run_is_certified_anew_and_says_so(client: TestClient, answer: Js
 
 
 def test_the_program_of_a_cycle_runs_from_stop_to_stop(client: TestClient) -> None:
-    found = client.post("/cycle", json=ROUND).json()
+    found = client.post("/cycle", json=CYCLE).json()
     exported = export(client, "urscript", found, urscript={"digital_output": 1})
     assert exported.status_code == 200, exported.text
     controller = Controller(np.array(HOME))

@@ -83,7 +83,7 @@ export function Baselines() {
   );
 }
 
-/** What a way breaks, in words; of a round, each limit once, with the moves that break it. */
+/** What a way breaks, in words; of a cycle, each limit once, with the moves that break it. */
 export function reasonOf({ reason, broken = [] }: Baseline): string {
   if (reason) return reason;
   const moves = new Map<string, string[]>();

@@ -8,7 +8,7 @@ import { nounOf, periodOf } from "../store/facts";
 import { figure, fixed } from "../store/units";
 import { adviceFailed, advised, waits } from "./advice";
 
-/** The parts of what one move or round costs. */
+/** The parts of what one move or cycle costs. */
 function partsOf(shown: Answered): { name: string; joules: number }[] {
   const { total, dwell = 0 } = shown.solution.energy.electrical;
   const waiting = advised.value?.waiting ?? 0;
@@ -31,8 +31,8 @@ export function CostTable() {
   const [open, setOpen] = useState(false);
   if (!shown) return null;
   const given = economics.value;
-  const costs = costsOf(partsOf(shown), periodOf(shown, given.cycle), given);
-  const unpriced = waits(shown, given.cycle) && !advised.value && !stale.value;
+  const costs = costsOf(partsOf(shown), periodOf(shown, given.cycleTime), given);
+  const unpriced = waits(shown, given.cycleTime) && !advised.value && !stale.value;
   const kwh = (value: number) => `${figure(value)} kWh`;
   return (
     <Section
@@ -49,7 +49,7 @@ export function CostTable() {
           <tr>
             <td />
             <th scope="col">
-              <b>{shown.cycle ? "round" : "cycle"}</b> {`${figure(costs.cycle)}\u00a0s`}
+              <b>cycle</b> {`${figure(costs.cycleTime)}\u00a0s`}
             </th>
             <th scope="col">
               <b>shift</b> {fixed(costs.cyclesPerShift, 0)}×
@@ -97,11 +97,11 @@ export function CostTable() {
           {fixed(given.carbon.value, 2)} kg CO₂e a kWh ({short(given.carbon)})
         </span>
         . {given.box ? "" : "The control box itself is not counted: enter a wattmeter’s reading. "}
-        {given.cycle === null && !shown.cycle && !shown.asked?.dwell
+        {given.cycleTime === null && !shown.cycle && !shown.asked?.dwell
           ? "Back to back: say how often the move comes to price the wait."
           : ""}
-        {given.cycle !== null && given.cycle < shown.solution.duration
-          ? `This ${nounOf(shown)} takes longer than ${figure(given.cycle)} s. `
+        {given.cycleTime !== null && given.cycleTime < shown.solution.duration
+          ? `This ${nounOf(shown)} takes longer than ${figure(given.cycleTime)} s. `
           : ""}
         {unpriced
           ? adviceFailed.value

@@ -13,7 +13,7 @@ export function gapOf(leg: Leg, objective: "electrical" | "mechanical"): string 
   return answer && bound > 0 && needed < MOST * bound ? atMost(needed / bound - 1) : "–";
 }
 
-/** The legs of a round, each with its own gap. */
+/** The legs of a cycle, each with its own gap. */
 export function Legs() {
   const shown = answered.value;
   const cycle = shown?.cycle;

@@ -9,7 +9,7 @@ import { figure } from "../store/units";
 import { plain } from "../store/facts";
 import { advised, CHANGES, wordsOf, type Change } from "./advice";
 
-const LEAST = 0.05; // share of a round below which its way home is no matter
+const LEAST = 0.05; // share of a cycle below which its way home is no matter
 const MOST = 3;
 const SPARE = 0.002; // clearance beyond the margins that is worth a note [m]
 

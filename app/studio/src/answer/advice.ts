@@ -7,7 +7,7 @@ import type { ApiRequest } from "../store/types";
 import { figure, percent } from "../store/units";
 
 const PAUSE = 400; // after the last change of the cycle time [ms]
-const MOST = 30; // time that a round may have taken for its changes to be computed unasked [s]
+const MOST = 30; // time that a cycle may have taken for its changes to be computed unasked [s]
 
 /** A changed task, as `POST /advice` answers. Energies in J. */
 export interface Change {
@@ -36,9 +36,9 @@ export const adviceFailed = signal(false);
 
 /** What a change is, and the button that makes it. */
 export const CHANGES: Record<Change["name"], { text: string; button: string }> = {
-  whole_cycle: { text: "Over the whole cycle", button: "Use whole cycle" },
+  whole_cycle: { text: "Over the whole cycle time", button: "Use the cycle time" },
   brakes: { text: "With brakes at rest, 0.5 s after it stands", button: "Use brakes" },
-  without_home: { text: "A round from the last stop", button: "Leave out" },
+  without_home: { text: "A cycle from the last stop", button: "Leave out" },
   shorter_stops: { text: "With every stop 0.1 s shorter", button: "Shorten" },
   lighter_tool: { text: "With a tool of half the mass", button: "" },
 };
@@ -48,26 +48,29 @@ export const wordsOf = ({ name, energy, share, duration }: Change) =>
   `${CHANGES[name].text}: ${figure(energy)} J${name === "without_home" ? ` in ${figure(duration)} s` : ""}, ${percent(share)} less.`;
 
 /** Whether the motion ends before the next one begins, so that it waits. */
-export const waits = ({ asked, solution }: Answered, cycle: number | null): cycle is number =>
-  cycle !== null && cycle > solution.duration && (asked?.dwell ?? null) === null;
+export const waits = (
+  { asked, solution }: Answered,
+  cycleTime: number | null,
+): cycleTime is number =>
+  cycleTime !== null && cycleTime > solution.duration && (asked?.dwell ?? null) === null;
 
 /** Follows the answer and the cycle time, from now on. */
 export function followAdvice(): void {
   let last: [Answered | null, number | null] = [null, null];
   effect(() => {
     const shown = answered.value;
-    const cycle = economics.value.cycle;
-    if (shown !== last[0] || cycle !== last[1]) {
+    const cycleTime = economics.value.cycleTime;
+    if (shown !== last[0] || cycleTime !== last[1]) {
       advised.value = null;
       adviceFailed.value = false;
     }
-    last = [shown, cycle];
+    last = [shown, cycleTime];
     // what the person asks for goes first
     if (!shown?.asked || !shown.solution.id || stale.value || run.value) return undefined;
     if (advised.peek()?.whole) return undefined;
     const own = new AbortController();
     const begin = () =>
-      compute(shown, cycle, own.signal).catch(() => (adviceFailed.value = !own.signal.aborted));
+      compute(shown, cycleTime, own.signal).catch(() => (adviceFailed.value = !own.signal.aborted));
     const timer = setTimeout(() => untracked(() => void begin()), PAUSE);
     return () => {
       clearTimeout(timer);
@@ -76,12 +79,16 @@ export function followAdvice(): void {
   });
 }
 
-async function compute(shown: Answered, cycle: number | null, signal: AbortSignal): Promise<void> {
+async function compute(
+  shown: Answered,
+  cycleTime: number | null,
+  signal: AbortSignal,
+): Promise<void> {
   const asked = shown.asked!;
   const body = {
     [endpointOf(asked)]: asked,
     answer: shown.solution.id,
-    period: waits(shown, cycle) ? cycle : null,
+    period: waits(shown, cycleTime) ? cycleTime : null,
   };
   const ask = (more: object) => post<Advised>("advice", { ...body, ...more }, signal);
   advised.value = { ...(await ask({ changes: [] })), whole: false };

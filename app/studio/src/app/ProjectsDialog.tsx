@@ -13,7 +13,7 @@ function cellText(asked: ApiRequest): string {
   const kind = kindOf(asked);
   const count = listOf(asked.stops).length;
   const stops = count === 1 ? "1 stop" : `${count} stops`;
-  return `${robotName(asked)}, ${kind === "round" ? stops : kind}`;
+  return `${robotName(asked)}, ${kind === "cycle" ? stops : kind}`;
 }
 
 /** The projects of this browser. */

@@ -22,7 +22,7 @@ export function LegTimeline({ cycle: { legs, loads } }: { cycle: CycleShown }) {
   return (
     <div class="timeline" id="timeline">
       <p class="hint">Legs as wide as their time, as high as their mean power; joules inside</p>
-      <div class="legs" role="group" aria-label="Legs of the round">
+      <div class="legs" role="group" aria-label="Legs of the cycle">
         {legs.map((leg, k) => {
           const text = `${legName(leg)}: ${figure(leg.duration)} s, ${figure(leg.electrical)} J, ${figure(leg.payload_mass)} kg`;
           const height = heights[k]!;

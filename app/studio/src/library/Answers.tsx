@@ -21,7 +21,7 @@ const MOST = 50;
 const OPENED = ["optimize", "cycle"]; // endpoints whose answers are drawn
 const OF_LOGS = ["identify", "residuals"]; // answers of identifications, which have a list of their own
 
-const kindOf = (kind: string) => ({ optimize: "move", cycle: "round" })[kind] ?? words(kind);
+const kindOf = (kind: string) => (kind === "optimize" ? "move" : words(kind));
 
 const factsOf = ({ kind, energy, duration, robot, created }: Kept) =>
   [
@@ -41,8 +41,7 @@ export function Answers() {
   const latest = useRef(0);
   const load = async (after?: string) => {
     const mine = ++latest.current;
-    const text = /^rounds?$/i.test(search) ? "cycle" : search;
-    const query = { whole: "true", limit: `${MOST}`, search: text, after };
+    const query = { whole: "true", limit: `${MOST}`, search, after };
     const page = await listed<{ answers: Kept[]; next: string | null }>("answers", query);
     if (mine !== latest.current) return;
     const own = page.answers.filter(({ kind }) => !OF_LOGS.includes(kind));

@@ -17,7 +17,7 @@ import { reachedGhost } from "./reachedGhost";
 import { place } from "./shapes";
 import { colour } from "./theme";
 
-const NEAR = 0.5; // of a round, for which the nearest pair is shown before and after its instant [s]
+const NEAR = 0.5; // of a cycle, for which the nearest pair is shown before and after its instant [s]
 const SAMPLES = 24; // of a motion that the picture is to hold
 
 interface Built {
@@ -153,7 +153,7 @@ export class Content {
       this.parts.ghosts.add(arm.object);
     };
     if (now.motion) ghost(now.start, colour("--start"), 0.2);
-    // a round ends where it begins
+    // a cycle ends where it begins
     if (now.goal) ghost(now.goal, colour("--goal"), 0.2);
     for (const { q, colour: tint } of ghosts.value) ghost(q, tint, 0.42);
     const best = reachedGhost.value ?? run.value?.incumbents.at(-1)?.q_goal;
@@ -172,7 +172,7 @@ export class Content {
     }
   }
 
-  /** The stops of a round, by their names; several may be at one place. */
+  /** The stops of a cycle, by their names; several may be at one place. */
   private nameStops({ motion }: Pictured): void {
     const places = new Map<string, string[]>();
     const stops = motion?.cycle ? stopsOf(motion.cycle) : [];
@@ -204,7 +204,7 @@ export class Content {
     for (const arm of this.arms) arm.showCapsules(show.value.capsules);
     for (const name of ["ghosts", "path", "axes"] as const)
       this.parts[name].visible = show.value[name];
-    // in a round the arm is elsewhere most of the time
+    // in a cycle the arm is elsewhere most of the time
     const near =
       this.nearest &&
       show.value.nearest &&

@@ -15,7 +15,7 @@ export interface Pictured {
   robot: Robot;
   /** Tool, payload, TCP and the obstacles in the base frame. */
   cell: ApiRequest;
-  /** The motion with its round; null: the arm stands. */
+  /** The motion with its cycle; null: the arm stands. */
   motion: Answered | null;
   arms: { name: string; solution: Solution; colour: number }[];
   /** Whether it is of a place of the base that is looked at. */
@@ -23,7 +23,7 @@ export interface Pictured {
   /** Where the arm stands, and where it is to go. */
   start: number[];
   goal: number[] | null;
-  /** The name of that place: a round being edited has stops. */
+  /** The name of that place: a cycle being edited has stops. */
   goalName: string;
 }
 

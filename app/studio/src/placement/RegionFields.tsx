@@ -15,7 +15,7 @@ export function RegionFields() {
   const checked = regionOf(given, 0);
   const why =
     kind.value === "path"
-      ? "A path is placed as a stop of a round: choose Round."
+      ? "A path is placed as a stop of a cycle: choose Cycle."
       : (lackOf(request.value)?.text ?? ("why" in checked ? checked.why : null));
   const running = run.value?.endpoint === "placement";
   const mount = (name: Mount, on: boolean) => {

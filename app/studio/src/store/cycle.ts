@@ -1,4 +1,4 @@
-// Whole rounds: their legs, played as one motion.
+// Whole cycles: their legs, played as one motion.
 import { obstaclesOf } from "./chain";
 import { keptAnswer, robotOf } from "./service";
 import type { Answered, CycleShown } from "./state";
@@ -20,7 +20,7 @@ export async function cycleAnswered(
     cycle.legs.map(({ answer }) => (answer ? keptAnswer<Solution>(answer) : null)),
   );
   const first = moves.find((move) => move !== null);
-  if (!first) throw new Error("This round has no move that could be shown.");
+  if (!first) throw new Error("This cycle has no move that could be shown.");
   const worst = cycle.certificate.clearance;
   const clearance = worst && { ...worst, time: worst.time + (cycle.legs[worst.leg ?? 0]?.t0 ?? 0) };
   const solution: Solution = {
@@ -92,7 +92,7 @@ function loadsOf(
   });
 }
 
-/** Number of the leg at a time of the round. */
+/** Number of the leg at a time of the cycle. */
 export function legAt(legs: { t0: number }[], time: number): number {
   return Math.max(
     0,
@@ -105,6 +105,6 @@ export function legName({ kind, start, passes, goal }: Leg): string {
   return kind === "move" ? names.join(" → ") : `${kind} at ${goal.stop ?? "?"}`;
 }
 
-/** Where the arm stands at a stop of a round that is shown. */
+/** Where the arm stands at a stop of a cycle that is shown. */
 export const stopsOf = (cycle: Cycle): Configuration[] =>
   cycle.legs.flatMap(({ passes, goal }) => [...(passes ?? []), goal]);

@@ -11,7 +11,7 @@ export interface Sourced {
 
 export interface Economics {
   /** One move every so many seconds; null: back to back. */
-  cycle: number | null;
+  cycleTime: number | null;
   /** Hours of a shift. */
   shift: number;
   shiftsPerYear: number;
@@ -24,7 +24,7 @@ export interface Economics {
 }
 
 export const DEFAULT_ECONOMICS: Economics = {
-  cycle: null,
+  cycleTime: null,
   shift: 8,
   shiftsPerYear: 460,
   price: {
@@ -40,7 +40,8 @@ export const DEFAULT_ECONOMICS: Economics = {
 export function economicsOf(given: Record<string, unknown>): Economics {
   const known = DEFAULT_ECONOMICS;
   return {
-    cycle: numberOf(given.cycle, 0) || null,
+    // projects of earlier versions name it `cycle`
+    cycleTime: numberOf(given.cycleTime ?? given.cycle, 0) || null,
     shift: numberOf(given.shift, known.shift),
     shiftsPerYear: numberOf(given.shiftsPerYear, known.shiftsPerYear),
     price: sourcedOf(given.price, known.price),
@@ -65,7 +66,7 @@ function sourcedOf<T>(given: unknown, otherwise: T): Sourced | T {
 const JOULES = 3.6e6; // of a kWh
 
 export interface Costs {
-  cycle: number;
+  cycleTime: number;
   cyclesPerShift: number;
   rows: { name: string; joules: number; shift: number; year: number }[];
   total: { joules: number; shift: number; year: number };
@@ -73,14 +74,14 @@ export interface Costs {
   carbon: { shift: number; year: number };
 }
 
-/** Costs of a motion of several parts, of which one begins every `cycle` seconds. */
+/** Costs of a motion of several parts, of which one begins every `cycleTime` seconds. */
 export function costsOf(
   parts: { name: string; joules: number }[],
-  cycle: number,
+  cycleTime: number,
   given: Economics,
 ): Costs {
-  const cyclesPerShift = Math.floor((given.shift * 3600) / cycle + 1e-9);
-  const box = given.box ? [{ name: "Control box", joules: given.box.value * cycle }] : [];
+  const cyclesPerShift = Math.floor((given.shift * 3600) / cycleTime + 1e-9);
+  const box = given.box ? [{ name: "Control box", joules: given.box.value * cycleTime }] : [];
   const rows = [...parts, ...box].map((part) => {
     const shift = (part.joules * cyclesPerShift) / JOULES;
     return { ...part, shift, year: shift * given.shiftsPerYear };
@@ -89,7 +90,7 @@ export function costsOf(
   const total = { joules: sum("joules"), shift: sum("shift"), year: sum("year") };
   const times = (value: number) => ({ shift: total.shift * value, year: total.year * value });
   return {
-    cycle,
+    cycleTime,
     cyclesPerShift,
     rows,
     total,

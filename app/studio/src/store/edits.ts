@@ -6,16 +6,16 @@ import type { ApiRequest, Obstacle, Pose, Robot, Stop } from "./types";
 
 // fields of one kind of request that the other kind lacks; `windings` has another meaning in it
 const OF_MOVES = ["goal", "path", "duration", "dwell", "bound", "windings"];
-const OF_ROUNDS = "stops order before together closed time hold wait windings".split(" ");
+const OF_CYCLES = "stops order before together closed time hold wait windings".split(" ");
 
 const without = (request: ApiRequest, fields: string[]): ApiRequest =>
   Object.fromEntries(Object.entries(request).filter(([name]) => !fields.includes(name)));
 
 /** The same cell as a request of another kind: its first and last targets stay. */
 export function asKind(request: ApiRequest, kind: Kind): ApiRequest {
-  if (kind === "round") {
+  if (kind === "cycle") {
     if (request.stops) return request;
-    // the branches of a move hold at both ends, those of a round at its start alone
+    // the branches of a move hold at both ends, those of a cycle at its start alone
     const branch = isObject(request.branch) ? { branch: request.branch } : {};
     const via = listOf<Pose>(at(request, "/path/via")).map((pose, k): Stop => ({
       name: `via ${k + 1}`,
@@ -29,14 +29,14 @@ export function asKind(request: ApiRequest, kind: Kind): ApiRequest {
     .filter((stop) => isObject(stop) && stop.target)
     .at(-1)?.target;
   const goal = request.stops ? last : request.goal;
-  const rest = without(request, request.stops ? OF_ROUNDS : ["path"]);
+  const rest = without(request, request.stops ? OF_CYCLES : ["path"]);
   const move: ApiRequest = goal === undefined ? rest : { ...rest, goal };
   return kind === "path" ? { ...move, path: isObject(request.path) ? request.path : {} } : move;
 }
 
 /** The fields of a request that belong to its kind. */
 export function ownFields(request: ApiRequest): ApiRequest {
-  const fields = request.stops ? OF_ROUNDS : OF_MOVES;
+  const fields = request.stops ? OF_CYCLES : OF_MOVES;
   return Object.fromEntries(Object.entries(request).filter(([name]) => fields.includes(name)));
 }
 
@@ -47,7 +47,7 @@ export function ownFields(request: ApiRequest): ApiRequest {
 export function asKindAgain(request: ApiRequest, kind: Kind, before: ApiRequest): ApiRequest {
   const made = asKind(request, kind);
   const { path } = before;
-  if (kind !== "round")
+  if (kind !== "cycle")
     return { ...(request.stops ? before : {}), ...made, ...(path ? { path } : {}) };
   const stops = [...listOf<Stop>(before.stops)];
   const last = stops.findLastIndex((stop) => isObject(stop) && stop.target);
@@ -100,13 +100,13 @@ export function withSpeed(request: ApiRequest, most: number | undefined, held: b
 const namesOf = (stops: Stop[]) => stops.map((stop, k) => stop?.name ?? `${k + 1}`);
 
 /**
- * The request with one more stop at its end; a move becomes a round, a path has one more pose on
+ * The request with one more stop at its end; a move becomes a cycle, a path has one more pose on
  * its way.
  */
 export function withStop(request: ApiRequest, target: unknown = null, name = "stop 1"): ApiRequest {
-  const round = asKind(request, "round");
-  const stops = listOf<Stop>(round.stops);
-  return { ...round, stops: [...stops, { name: freshName(name, namesOf(stops)), target }] };
+  const cycle = asKind(request, "cycle");
+  const stops = listOf<Stop>(cycle.stops);
+  return { ...cycle, stops: [...stops, { name: freshName(name, namesOf(stops)), target }] };
 }
 
 export function withVia(request: ApiRequest, pose: Pose): ApiRequest {

@@ -29,15 +29,15 @@ export const baselineName = (name: string, along = false) =>
 
 export const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
 
-export const nounOf = (shown: Answered) => (shown.cycle ? "round" : "move");
+export const nounOf = (shown: Answered) => (shown.cycle ? "cycle" : "move");
 
 /**
- * Time from the start of a motion to the start of the next [s]: `cycle`, if one comes every so many
+ * Time from the start of a motion to the start of the next [s]: `cycleTime`, if one comes every so many
  * seconds. A request with a wait has its own.
  */
-export function periodOf({ asked, solution }: Answered, cycle: number | null): number {
+export function periodOf({ asked, solution }: Answered, cycleTime: number | null): number {
   const own = at(asked, "/dwell/time");
-  return Math.max(typeof own === "number" ? own : (cycle ?? 0), solution.duration);
+  return Math.max(typeof own === "number" ? own : (cycleTime ?? 0), solution.duration);
 }
 
 /** Energy of the objective that was minimised [J]. */

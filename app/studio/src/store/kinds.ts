@@ -1,5 +1,5 @@
 // Another kind of task. Fields that one kind has and another one has not, such as the stops of a
-// round, are kept until that kind is chosen again.
+// cycle, are kept until that kind is chosen again.
 import { asKind, asKindAgain, ownFields } from "./edits";
 import { kindOf, robotName, type Kind } from "./request";
 import { edit, project, request } from "./state";

@@ -9,7 +9,7 @@ import { page, replaceCell, toast } from "./state";
 import { tell } from "./trouble";
 import type { ApiRequest, Cycle, Solution } from "./types";
 
-/** A kept answer with its request; a part of another answer, such as a move of a round, has none. */
+/** A kept answer with its request; a part of another answer, such as a move of a cycle, has none. */
 interface Kept {
   name: string | null;
   request: ApiRequest | null;
@@ -80,7 +80,7 @@ export async function openKept(path: string): Promise<void> {
   const address = path.includes("/") ? path : `answers/${encodeURIComponent(path)}`;
   const { name, request: sent, typed, answer } = await get<Kept>(address);
   if (!answer?.branch && !answer?.legs)
-    throw new Error("Only motions and rounds are shown here: this answer is of another kind.");
+    throw new Error("Only motions and cycles are shown here: this answer is of another kind.");
   const here = answer.id ? await askedFor(answer.id) : null;
   const request = here?.request ?? sent ?? requestOfMove(answer);
   replaceCell({

@@ -88,7 +88,7 @@ export async function askedFor(id: string): Promise<Cell | null> {
   const found = await within<Asked | undefined>("asked", "readonly", (store) =>
     store.get(id),
   ).catch(() => undefined);
-  return found?.cell ?? null;
+  return found ? cellFrom({ ...found.cell }) : null;
 }
 
 async function keepAsked(id: string, cell: Cell): Promise<void> {

@@ -5,7 +5,7 @@ import { diff } from "./diff";
 import { asKind } from "./edits";
 import { capital, energyOf } from "./facts";
 import { placesOf, REASONS, worldOf, yawOf } from "./places";
-import type { Layer, Mount, Place, PlacedRound, PlacementAnswer } from "./places";
+import type { Layer, Mount, Place, PlacedCycle, PlacementAnswer } from "./places";
 import { deadlineOf, endpointOf, isObject, robotName } from "./request";
 import { answeredBy, compute, named } from "./run";
 import { seenFrom } from "./seenFrom";
@@ -117,16 +117,16 @@ export function regionOf(given: RegionTyped, yaw: number): Asked | { why: string
   return { region, resolution, deadline };
 }
 
-/** A move as a round of one stop, from which the arm does not return. */
-export function roundOf(asked: ApiRequest): ApiRequest {
+/** A move as a cycle of one stop, from which the arm does not return. */
+export function cycleOf(asked: ApiRequest): ApiRequest {
   if (asked.stops !== undefined) return asked;
   const { duration, dwell } = asked;
-  const round: ApiRequest = { ...asKind(asked, "round"), closed: false };
+  const cycle: ApiRequest = { ...asKind(asked, "cycle"), closed: false };
   if (isObject(dwell)) {
     const { time, ...hold } = dwell;
-    return { ...round, time, wait: "goal", ...(Object.keys(hold).length ? { hold } : {}) };
+    return { ...cycle, time, wait: "goal", ...(Object.keys(hold).length ? { hold } : {}) };
   }
-  return duration === undefined ? round : { ...round, time: duration };
+  return duration === undefined ? cycle : { ...cycle, time: duration };
 }
 
 /** Asks for the map of the region, and looks at its best place. */
@@ -138,7 +138,7 @@ export async function search(): Promise<void> {
     const world = worldOf(asked, robot);
     const given = regionOf(regionTyped.value, yawOf(world));
     if ("why" in given) throw new Error(given.why);
-    const cycle = seenFrom(roundOf(asked), inverse(world), robot);
+    const cycle = seenFrom(cycleOf(asked), inverse(world), robot);
     const body = { cycle, base: poseOfMatrix(world), ...given };
     const answer = (await compute("placement", body, given.deadline)) as PlacementAnswer | null;
     if (!answer) return;
@@ -154,7 +154,7 @@ export async function search(): Promise<void> {
   }
 }
 
-const poseOf = ({ world }: Mapped, { base }: PlacedRound) => multiply(inverse(world), ofPose(base));
+const poseOf = ({ world }: Mapped, { base }: PlacedCycle) => multiply(inverse(world), ofPose(base));
 
 export const bestPose = (map: Mapped) => poseOf(map, map.answer.best);
 
@@ -215,10 +215,10 @@ async function motionAt({ asked, robot, pose }: Looked, map: Mapped | null) {
   const placed = [map?.answer.best, map?.answer.nominal];
   const kept = placed.find((each) => each && isAt(poseOf(map!, each), pose));
   if (kept) {
-    const round = await keptAnswer<Cycle>(kept.cycles[0]!.answer);
-    if (asked.stops !== undefined) return answeredBy(round, there, null);
-    // a single move was placed as a round; with a wait, it is computed as the move that it is
-    const [leg, ...rests] = round.legs;
+    const cycle = await keptAnswer<Cycle>(kept.cycles[0]!.answer);
+    if (asked.stops !== undefined) return answeredBy(cycle, there, null);
+    // a single move was placed as a cycle; with a wait, it is computed as the move that it is
+    const [leg, ...rests] = cycle.legs;
     if (!rests.length) return answeredBy(await keptAnswer(leg!.answer!), there, null);
   }
   const answer = await compute(endpointOf(asked), there, deadlineOf(asked));

@@ -26,7 +26,7 @@ interface MapPoint {
   reason: Reason | null;
 }
 
-export interface PlacedRound extends Pick<MapPoint, "base" | "mount"> {
+export interface PlacedCycle extends Pick<MapPoint, "base" | "mount"> {
   energy: number;
   duration: number;
   cycles: { answer: string; request: ApiRequest | null }[];
@@ -36,8 +36,8 @@ export interface PlacedRound extends Pick<MapPoint, "base" | "mount"> {
 export interface PlacementAnswer {
   id: string | null;
   status: "complete" | "cut_short";
-  best: PlacedRound;
-  nominal: PlacedRound | null;
+  best: PlacedCycle;
+  nominal: PlacedCycle | null;
   nominal_reason: Reason | null;
   saving: number | null;
   lower_bound: number | null;

@@ -21,7 +21,7 @@ export const reached = signal<Record<Pointer, Reach>>({});
 
 const known = new Map<string, Reach>();
 let waiting: ReturnType<typeof setTimeout> | undefined;
-let round = 0;
+let turn = 0;
 
 /** What `POST /ik` is asked about a pose of a request. */
 export function ikBody(asked: ApiRequest, pose: Pose, windings: boolean): Record<string, unknown> {
@@ -60,7 +60,7 @@ export function followReach(): void {
 }
 
 async function askAll(asked: ApiRequest): Promise<void> {
-  const own = ++round;
+  const own = ++turn;
   const rows = rowsOf(asked)
     .filter((row) => targetAt(asked, row).kind === "pose")
     .slice(0, MOST);
@@ -75,7 +75,7 @@ async function askAll(asked: ApiRequest): Promise<void> {
   for (const [k, { pointer, pose }] of bodies.entries()) {
     if (known.has(keys[k]!)) continue;
     const found = await ask(asked, pose);
-    if (own !== round) return;
+    if (own !== turn) return;
     if (found && found.state !== "asking") known.set(keys[k]!, found);
     const { [pointer]: _, ...others } = reached.value;
     reached.value = found ? { ...others, [pointer]: found } : others;

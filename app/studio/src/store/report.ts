@@ -14,8 +14,9 @@ export type ReportFormat = "html" | "pdf";
 /** The numbers for costs as `POST /report` takes them. */
 export function costsFor(given: Economics, cyclesPerShift: number | null) {
   const yours = (value: number) => ({ value, source: "yours" });
-  const { cycle, shift, shiftsPerYear } = given;
-  const asked = cyclesPerShift !== null && (cycle !== null || shift !== DEFAULT_ECONOMICS.shift);
+  const { cycleTime, shift, shiftsPerYear } = given;
+  const asked =
+    cyclesPerShift !== null && (cycleTime !== null || shift !== DEFAULT_ECONOMICS.shift);
   return {
     ...(asked ? { cycles_per_shift: yours(cyclesPerShift) } : {}),
     shifts_per_year:
@@ -37,8 +38,8 @@ export async function reportAnswer(format: ReportFormat): Promise<void> {
   const body = {
     [endpointOf(shown.asked)]: shown.asked,
     answer: shown.solution.id,
-    period: given.cycle,
-    costs: costsFor(given, costsOf([], periodOf(shown, given.cycle), given).cyclesPerShift),
+    period: given.cycleTime,
+    costs: costsFor(given, costsOf([], periodOf(shown, given.cycleTime), given).cyclesPerShift),
   };
   await report(body, name, format);
 }

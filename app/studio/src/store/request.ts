@@ -3,7 +3,7 @@ import { rotvecOf, turnOf } from "./chain";
 import { at, join, type Pointer } from "./pointer";
 import type { ApiRequest, Obstacle, Pose, Stop } from "./types";
 
-export type Kind = "move" | "round" | "path";
+export type Kind = "move" | "cycle" | "path";
 
 export interface Row {
   pointer: Pointer;
@@ -34,7 +34,7 @@ const areNumbers = (value: unknown, count?: number): value is number[] =>
   (count === undefined || value.length === count);
 
 export function kindOf(request: ApiRequest): Kind {
-  if (request.stops !== undefined) return "round";
+  if (request.stops !== undefined) return "cycle";
   return isObject(request.path) ? "path" : "move";
 }
 
@@ -42,11 +42,11 @@ export const robotName = (request: ApiRequest) =>
   typeof request.robot === "string" ? request.robot : DEFAULT_ROBOT;
 
 export const endpointOf = (request: ApiRequest): "cycle" | "optimize" =>
-  kindOf(request) === "round" ? "cycle" : "optimize";
+  kindOf(request) === "cycle" ? "cycle" : "optimize";
 
 /** Deadlines of the API where a request has none [s]; a test holds them to its schema. */
 const DEADLINES = { optimize: 10, cycle: 60, long: 120 };
-const LONG = 100; // stops of a round, above which its deadline is the long one
+const LONG = 100; // stops of a cycle, above which its deadline is the long one
 
 /** How long the service computes at most [s]. */
 export function deadlineOf(asked: ApiRequest): number {
@@ -60,7 +60,7 @@ export const stopName = (stop: unknown, index: number): string =>
 /** The targets of a request in their order. */
 export function rowsOf(request: ApiRequest): Row[] {
   const start: Row = { pointer: "/start", role: "start", name: "Start", bare: false };
-  if (kindOf(request) === "round") {
+  if (kindOf(request) === "cycle") {
     const stops = listOf<Stop>(request.stops).map((stop, k): Row => ({
       pointer: join("stops", k, "target"),
       role: "stop",
@@ -150,8 +150,8 @@ export function freshName(name: string, others: unknown[]): string {
 
 /** What the request lacks before it can be sent; null if nothing. */
 export function lackOf(request: ApiRequest): { pointer: Pointer; text: string } | null {
-  if (kindOf(request) === "round" && !listOf(request.stops).length)
-    return { pointer: "/stops", text: "Add a stop: a round has at least one." };
+  if (kindOf(request) === "cycle" && !listOf(request.stops).length)
+    return { pointer: "/stops", text: "Add a stop: a cycle has at least one." };
   for (const row of rowsOf(request))
     if (targetAt(request, row).kind === "empty")
       return { pointer: row.pointer, text: `${row.name} is empty: type, paste or take a pose.` };

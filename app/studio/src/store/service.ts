@@ -97,5 +97,5 @@ export async function examples(): Promise<Example[]> {
     const given = paths[path]?.post?.requestBody?.content["application/json"]?.examples ?? {};
     return Object.values(given).map(({ summary, value }) => ({ summary: mark + summary, value }));
   };
-  return [...of("/optimize", ""), ...of("/cycle", "Round: ")];
+  return [...of("/optimize", ""), ...of("/cycle", "Cycle: ")];
 }

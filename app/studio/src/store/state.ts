@@ -227,7 +227,7 @@ export function replaceCell(cell: {
     request.value = cell.request;
     typed.value = cell.typed ?? {};
     // prices are those of the place, but how often a motion comes is of its cell
-    economics.value = cell.economics ?? { ...economics.value, cycle: null };
+    economics.value = cell.economics ?? { ...economics.value, cycleTime: null };
     answered.value = null;
     racers.value = [];
     ghosts.value = [];

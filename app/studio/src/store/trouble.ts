@@ -46,7 +46,7 @@ function pointerOf(details: ProblemDetails, asked: ApiRequest): Pointer | null {
   const stop = listOf(asked.stops).findIndex(isOf);
   if (stop >= 0) return `/stops/${stop}/target`;
   const pointer = FIELDS[slugOf(details)];
-  return pointer === "/duration" && kindOf(asked) === "round" ? "/time" : (pointer ?? null);
+  return pointer === "/duration" && kindOf(asked) === "cycle" ? "/time" : (pointer ?? null);
 }
 
 /** Shows what went wrong with a request, at its fields where they are known. */

@@ -108,7 +108,7 @@ export interface Baseline {
   mechanical: number;
   within_limits: boolean;
   reason?: string | null;
-  /** Of a round: its moves that break limits. */
+  /** Of a cycle: its moves that break limits. */
   broken?: { start: string; goal: string; reason: string }[];
   saving: number | null;
   saving_interval: Interval | null;

@@ -19,7 +19,7 @@ const unitsNote = () =>
 /** Where the arm begins, passes, stops and ends. */
 export function TargetTable() {
   const rows = rowsOf(request.value);
-  const round = kind.value === "round";
+  const isCycle = kind.value === "cycle";
   const path = kind.value === "path";
   const add = () => {
     const present = presentTarget("pose");
@@ -28,11 +28,11 @@ export function TargetTable() {
   };
   return (
     <Section
-      title={round ? "Stops" : "Targets"}
-      note={round ? `${rows.length - 1}` : unitsNote()}
+      title={isCycle ? "Stops" : "Targets"}
+      note={isCycle ? `${rows.length - 1}` : unitsNote()}
       id="targets"
     >
-      {round && <Order />}
+      {isCycle && <Order />}
       {rows.map((row, k) => (
         <PoseRow key={row.pointer} row={row} index={k} />
       ))}
@@ -59,7 +59,7 @@ export function TargetTable() {
           Drag
         </Button>
       </div>
-      {kind.value === "move" && <p class="hint">With a stop, the move becomes a round.</p>}
+      {kind.value === "move" && <p class="hint">With a stop, the move becomes a cycle.</p>}
       <Errors under="/stops" except={rows.map(({ pointer }) => pointer.replace(/\/target$/, ""))} />
     </Section>
   );

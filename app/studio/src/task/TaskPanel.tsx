@@ -16,7 +16,7 @@ import { ToolPayload } from "./ToolPayload";
 
 const KINDS = [
   { value: "move", text: "Move" },
-  { value: "round", text: "Round" },
+  { value: "cycle", text: "Cycle" },
   { value: "path", text: "Path" },
 ] as const;
 

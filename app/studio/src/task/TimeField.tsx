@@ -8,11 +8,11 @@ import { isObject } from "../store/request";
 import { answered, economics, edit, kind, request, typed } from "../store/state";
 import type { ApiRequest } from "../store/types";
 
-type Choice = "free" | "cycle" | "most" | "exact" | "other";
+type Choice = "free" | "period" | "most" | "exact" | "other";
 
 const TEXTS: Record<Choice, string> = {
   free: "Least energy",
-  cycle: "Whole cycle",
+  period: "Cycle time",
   most: "At most",
   exact: "Exactly",
   other: "as in JSON",
@@ -21,7 +21,7 @@ const TEXTS: Record<Choice, string> = {
 const fieldOf = (asked: ApiRequest) => (asked.stops === undefined ? "/duration" : "/time");
 
 function choiceOf(asked: ApiRequest): Choice {
-  if (isObject(asked.dwell)) return "cycle";
+  if (isObject(asked.dwell)) return "period";
   const given = at(asked, fieldOf(asked));
   if (typeof given === "number") return "exact";
   if (!isObject(given)) return "free";
@@ -31,27 +31,27 @@ function choiceOf(asked: ApiRequest): Choice {
 /** Where the seconds of a choice are in the request; null for one without. */
 function secondsAt(asked: ApiRequest): string | null {
   const field = fieldOf(asked);
-  return { cycle: "/dwell/time", most: `${field}/max`, exact: field, free: null, other: null }[
+  return { period: "/dwell/time", most: `${field}/max`, exact: field, free: null, other: null }[
     choiceOf(asked)
   ];
 }
 
 /**
  * The request with another kind of time. The seconds are those of before; without them those of a
- * `cycle` that was given, or of the last answer.
+ * `cycleTime` that was given, or of the last answer.
  */
 export function withTime(
   asked: ApiRequest,
   choice: Choice,
-  cycle: number | null,
+  cycleTime: number | null,
   last = 2,
 ): ApiRequest {
   const field = fieldOf(asked);
   const pointer = secondsAt(asked);
   const given = pointer === null ? last : Number(at(asked, pointer));
-  const seconds = choice === "cycle" && cycle ? cycle : Math.ceil(given * 100) / 100;
+  const seconds = choice === "period" && cycleTime ? cycleTime : Math.ceil(given * 100) / 100;
   const free = put(put(asked, field, undefined), "/dwell", undefined);
-  if (choice === "cycle")
+  if (choice === "period")
     return put(free, "/dwell", { ...(isObject(asked.dwell) ? asked.dwell : {}), time: seconds });
   if (choice === "most") return put(free, field, { max: seconds });
   return choice === "exact" ? put(free, field, seconds) : free;
@@ -64,16 +64,16 @@ export function TimeField() {
   const choice = choiceOf(asked);
   const seconds = secondsAt(asked);
   const options: Choice[] = [
-    ...(["free", ...(kind.value === "round" ? [] : ["cycle"]), "most", "exact"] as Choice[]),
+    ...(["free", ...(kind.value === "cycle" ? [] : ["period"]), "most", "exact"] as Choice[]),
     ...(choice === "other" ? (["other"] as Choice[]) : []),
   ];
   const choose = (next: Choice) => {
     if (next === "other" || next === choice) return;
     const last = answered.value?.solution.duration;
-    edit(withTime(asked, next, economics.value.cycle, last), typed.value);
+    edit(withTime(asked, next, economics.value.cycleTime, last), typed.value);
   };
   return (
-    <Section title="Time" action={choice === "cycle" ? null : <Every />}>
+    <Section title="Time" action={choice === "period" ? null : <Every />}>
       <Segment
         label="Time"
         value={choice}
@@ -82,7 +82,7 @@ export function TimeField() {
       />
       {seconds && (
         <div class="field">
-          <span>{choice === "cycle" ? "from start to start" : "seconds"}</span>
+          <span>{choice === "period" ? "from start to start" : "seconds"}</span>
           <NumberCell label="Time" pointer={seconds} value={at(asked, seconds)} unit="s" withUnit />
         </div>
       )}
@@ -96,14 +96,14 @@ export function TimeField() {
 function Every() {
   return (
     <span class="every">
-      one {kind.value === "round" ? "round" : "move"} every{" "}
+      one {kind.value === "cycle" ? "cycle" : "move"} every{" "}
       <PlainNumber
         label="One move every so many seconds"
         unit="s"
-        value={economics.value.cycle}
+        value={economics.value.cycleTime}
         least="above zero"
         empty="–"
-        onValue={(cycle) => (economics.value = { ...economics.value, cycle })}
+        onValue={(cycleTime) => (economics.value = { ...economics.value, cycleTime })}
       />
     </span>
   );
