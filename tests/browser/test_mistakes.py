@@ -44,7 +44,7 @@ def part_of(cell: Locator) -> Locator:
         ),
         ("/goal/pose/position/2", "1400", "out of reach in this orientation"),
         ("/payload/mass", "40", "more than a Universal Robots UR5e may carry"),
-        ("/payload/mass", "-1", "greater than or equal to 0"),
+        ("/payload/mass", "-1", "at least 0"),
         ("/scene/obstacles/0/pose/position/2", "200", "in collision"),
     ],
 )
@@ -68,7 +68,7 @@ def test_a_group_that_is_shut_opens_for_its_mistake(page: Page) -> None:
     group = page.locator("#more")
     group.evaluate("(group) => { group.open = false; }")
     page.locator("#optimise").click()
-    expect(group.get_by_text("greater than or equal to -100")).to_be_visible()
+    expect(group.get_by_text("at least -100")).to_be_visible()
 
 
 def test_without_the_service_nothing_is_lost(browser: Browser, service: Server) -> None:
@@ -107,7 +107,7 @@ def test_numbers_that_are_none_are_refused_at_their_cells(page: Page) -> None:
     expect(page.locator("#run-state")).to_contain_text("Enter a number")
     type_into(page, "/payload/mass", "-1")
     page.locator("#optimise").click()
-    expect(page.locator("#form")).to_contain_text("greater than or equal to 0")
+    expect(page.locator("#form")).to_contain_text("at least 0")
 
 
 def test_prices_and_times_that_are_none_are_refused_where_they_stand(page: Page) -> None:
