@@ -29,6 +29,7 @@ and runs only a tenth faster. Without contraction, all processors round equally.
 
 SOURCE_MODULES = (
     joulepath.models.coupling,
+    joulepath.models.immutable,
     joulepath.models.robot,
     inverse_dynamics,
     losses,
