@@ -129,9 +129,9 @@ def _spreads(results: dict[str, Results | None]) -> Iterator[list[str]]:
 
 
 def _spread(task: str, quantity: str, spread: Results, factor: float, digits: int = 1) -> list[str]:
-    numbers = (
-        f"{spread[name] * factor:.{digits}f}" for name in ("p25", "p50", "p75", "p95", "maximum")
-    )
+    values = (spread[name] for name in ("p25", "p50", "p75", "p95", "maximum"))
+    # infinite values are null in JSON
+    numbers = ("∞" if value is None else f"{value * factor:.{digits}f}" for value in values)
     return [task, quantity, str(spread["count"]), *numbers]
 
 

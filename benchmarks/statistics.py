@@ -8,10 +8,16 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+LARGEST = 1e9
+"""Value from which a measured value counts as infinite, in any unit."""
+
 
 @dataclass(frozen=True)
 class Spread:
-    """Size, minimum, quartiles, percentiles and maximum of a sample, in the unit of the sample."""
+    """Size, minimum, quartiles, percentiles and maximum of a sample, in the unit of the sample.
+
+    Values may be infinite, such as the gap to a lower bound that is not positive.
+    """
 
     count: int
     minimum: float
@@ -28,10 +34,9 @@ class Spread:
         """The statistics of a sample; NaN for an empty sample."""
         if not len(values):
             return Spread(0, *[math.nan] * 8)
-        return Spread(
-            len(values),
-            *(float(np.percentile(values, p)) for p in (0, 25, 50, 75, 90, 95, 99, 100)),
-        )
+        # an interpolation between two infinite values is not a number
+        found = np.percentile(np.minimum(values, LARGEST), (0, 25, 50, 75, 90, 95, 99, 100))
+        return Spread(len(values), *np.where(found < LARGEST, found, np.inf).tolist())
 
     def times(self, factor: float) -> Spread:
         """The same statistics in another unit."""
