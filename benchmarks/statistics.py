@@ -8,9 +8,6 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-LARGEST = 1e9
-"""Value from which a measured value counts as infinite, in any unit."""
-
 
 @dataclass(frozen=True)
 class Spread:
@@ -34,9 +31,12 @@ class Spread:
         """The statistics of a sample; NaN for an empty sample."""
         if not len(values):
             return Spread(0, *[math.nan] * 8)
-        # an interpolation between two infinite values is not a number
-        found = np.percentile(np.minimum(values, LARGEST), (0, 25, 50, 75, 90, 95, 99, 100))
-        return Spread(len(values), *np.where(found < LARGEST, found, np.inf).tolist())
+        ranks = (0, 25, 50, 75, 90, 95, 99, 100)
+        with np.errstate(invalid="ignore"):
+            found = np.percentile(values, ranks)
+        # the interpolation beside an infinite value may be inf - inf or 0 · inf
+        above = np.percentile(values, ranks, method="higher")
+        return Spread(len(values), *np.where(np.isnan(found), above, found).tolist())
 
     def times(self, factor: float) -> Spread:
         """The same statistics in another unit."""

@@ -54,5 +54,7 @@ def test_spread() -> None:
     assert (spread.count, spread.minimum, spread.p50, spread.maximum) == (5, 1.0, 3.0, 10.0)
     assert spread.times(1e3).p50 == 3000.0 and spread.times(1e3).count == 5
     assert Spread.of([]).count == 0
-    unbounded = Spread.of([0.1, 0.2, np.inf, np.inf])
-    assert unbounded.minimum == 0.1 and unbounded.p95 == unbounded.maximum == np.inf
+    unbounded = Spread.of([0.1, 0.2, 0.3, np.inf, np.inf])
+    assert (unbounded.minimum, unbounded.p25, unbounded.p50) == (0.1, 0.2, 0.3)
+    assert unbounded.p75 == unbounded.p90 == unbounded.maximum == np.inf
+    assert Spread.of([1.0, np.inf]).p75 == np.inf
