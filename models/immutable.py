@@ -1,4 +1,4 @@
-"""Values that nobody can change by accident: robots and results are shared by their users."""
+"""Read-only arrays and documents, for robots and results that several callers share."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from typing import Any, NoReturn, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+from yaml.representer import Representer, SafeRepresenter
 
 T = TypeVar("T", bound=np.generic)
 
 
 def read_only_view(array: npt.NDArray[T]) -> npt.NDArray[T]:
-    """The array itself if it is read-only, else a read-only view of it."""
+    """A read-only array with the data of `array`: a view, or `array` if it is read-only already."""
     if array.flags.writeable:
         array = array.view()
         array.setflags(write=False)
@@ -20,10 +21,10 @@ def read_only_view(array: npt.NDArray[T]) -> npt.NDArray[T]:
 
 
 class ReadOnlyArrays:
-    """Base of frozen dataclasses whose arrays are read-only, also after pickling and copying.
+    """Base of frozen dataclasses with read-only array fields, also after pickling and copying.
 
-    The fields become read-only views: an array that its maker still fills stays writable for it.
-    A subclass with its own `__post_init__` calls this one.
+    Fields are views: the caller's array stays writable for the caller. Arrays inside of other
+    containers are not changed. A subclass with a `__post_init__` calls that of this class.
     """
 
     def __post_init__(self) -> None:
@@ -39,13 +40,13 @@ class ReadOnlyArrays:
 
 
 def _refuse(self: object, *_: object, **__: object) -> NoReturn:
-    raise TypeError("This is shared and cannot be changed: change a copy by copy.deepcopy.")
+    raise TypeError("Shared data cannot be changed: change a copy by copy.deepcopy.")
 
 
 class ReadOnlyDict(dict[str, Any]):
-    """A dictionary that cannot be changed. It can be pickled; its deep copy is a plain dictionary.
+    """A read-only dictionary. Its deep copy is a plain dictionary.
 
-    Unlike `MappingProxyType`, it crosses the borders of processes and is written as JSON.
+    Unlike `MappingProxyType`, it can be pickled, and written as JSON and YAML.
     """
 
     __setitem__ = __delitem__ = __ior__ = _refuse
@@ -59,7 +60,7 @@ class ReadOnlyDict(dict[str, Any]):
 
 
 class ReadOnlyList(list[Any]):
-    """A list that cannot be changed, as `ReadOnlyDict`."""
+    """A read-only list. Its deep copy is a plain list."""
 
     __setitem__ = __delitem__ = __iadd__ = __imul__ = _refuse
     append = clear = extend = insert = pop = remove = reverse = sort = _refuse
@@ -71,12 +72,18 @@ class ReadOnlyList(list[Any]):
         return [deepcopy(value, memo) for value in self]
 
 
+for _representer in (SafeRepresenter, Representer):
+    # YAML is written by classes, and knows dict and list alone
+    _representer.add_representer(ReadOnlyDict, SafeRepresenter.represent_dict)
+    _representer.add_representer(ReadOnlyList, SafeRepresenter.represent_list)
+
+
 def read_only_document(value: Any) -> Any:
-    """A document of dictionaries and lists that cannot be changed at any depth."""
+    """A document whose dictionaries and lists are read-only at every depth."""
     if isinstance(value, ReadOnlyDict | ReadOnlyList):
         return value
     if isinstance(value, dict):
-        return ReadOnlyDict({name: read_only_document(each) for name, each in value.items()})
+        return ReadOnlyDict({name: read_only_document(entry) for name, entry in value.items()})
     if isinstance(value, list | tuple):
-        return ReadOnlyList([read_only_document(each) for each in value])
+        return ReadOnlyList([read_only_document(entry) for entry in value])
     return value

@@ -11,7 +11,7 @@ import yaml
 from joulepath.models.registry import LOADER, bundled_robot, robot_names
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import UnknownRobot
-from joulepath.optimizer.problem.parts import check_type
+from joulepath.optimizer.problem.declared_types import check_type
 
 DESCRIPTIONS = (".yaml", ".yml")
 """File extensions of descriptions of own arms."""
@@ -22,7 +22,8 @@ def load_robot(
 ) -> Robot:
     """Load a robot that comes with the library, or a user's own arm.
 
-    A robot is loaded once per process: all threads get the same object, which cannot be changed.
+    A robot is loaded once per process: all threads get the same object. Its arrays and figures are
+    read-only; its Pinocchio model is not.
 
     Args:
         robot: one of `robot_names()`, or the path of a YAML file that describes an own arm; see
@@ -42,7 +43,7 @@ def load_robot(
     """
     if figures is not None:
         return _identified(load_robot(robot), figures)
-    check_type(robot, "robot", str, PathLike)
+    check_type("robot", robot, str, PathLike)
     if isinstance(robot, PathLike) or robot.endswith(DESCRIPTIONS):
         from joulepath.models.own_arm.robots import (
             read_robot,  # importing its validator takes as long as the rest of this package
@@ -65,7 +66,7 @@ def _identified(robot: Robot, figures: str | PathLike[str] | dict[str, Any]) -> 
     from joulepath.models.own_arm.robots import own_robot  # as above
     from joulepath.models.uncertainty.document import with_document
 
-    check_type(figures, "figures", dict, str, PathLike)
+    check_type("figures", figures, dict, str, PathLike)
     document = figures if isinstance(figures, dict) else _read_document(Path(figures))
     return own_robot(robot.name, with_document(robot.name, robot.figures, document))
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from joulepath import Arm, Pose, Problem, Solution, evaluate, inverse_kinematics, load_robot
 from joulepath.optimizer.optimize import optimize
@@ -97,3 +98,8 @@ def test_figures_are_written_as_json_and_copied_to_be_changed() -> None:
     assert json.loads(json.dumps(figures)) == figures == copy
     copy["limits"]["velocity"]["value"][0] = 9.0
     assert copy != load_robot("ur5e").figures
+
+
+def test_figures_are_written_as_yaml() -> None:
+    figures = load_robot("ur5e").figures
+    assert yaml.safe_load(yaml.safe_dump(figures)) == yaml.safe_load(yaml.dump(figures)) == figures
