@@ -1,25 +1,31 @@
-"""The field `deadline` of requests. Its upper limit is a setting of the service, so the schemas do
-not have it."""
+"""The field `deadline` of requests.
+
+The upper limit depends on the service, and on whether the request is a job. Schemas therefore have
+no upper limit; `too_long` checks it.
+"""
 
 from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, field_validator
+from pydantic_core import PydanticCustomError
 
 from joulepath.app.exceptions.base import FieldError
+from joulepath.app.schemas.common import Request
+from joulepath.app.settings import LONGEST_DEADLINE
 
 DeadlineSeconds = Annotated[float, Field(ge=1e-3)]
-"""Longest wall time of a request [s]; `too_long` checks its upper limit."""
+"""Longest wall time of a request [s]."""
 
 
 def given_deadline(asked: BaseModel) -> float | None:
-    """The deadline in a request [s]; None if it has none, and its default holds."""
+    """The deadline given in a request [s]; None if the request leaves it out."""
     return getattr(asked, "deadline", None) if "deadline" in asked.model_fields_set else None
 
 
 def too_long(given: float | None, longest: float, *where: str | int) -> list[FieldError]:
-    """The error of a deadline above the limit in force; none if it is in order.
+    """Errors of a given deadline: one if it exceeds the limit, else none.
 
     Args:
         given: the deadline of the request [s]; None for the default.
@@ -30,3 +36,22 @@ def too_long(given: float | None, longest: float, *where: str | int) -> list[Fie
         return []
     msg = f"Give a number of at most {longest:g}: no longer deadline is allowed here."
     return [{"loc": [*where, "deadline"], "msg": msg}]
+
+
+class WithBodies(Request):
+    """A request that contains bodies of other requests.
+
+    The deadlines of these bodies are limited by that of the whole. They may exceed it, so that the
+    request of a job can be sent on, but not the longest deadline of jobs.
+    """
+
+    @field_validator("optimize", "cycle", "evaluate", "placement", check_fields=False)
+    @classmethod
+    def _not_too_long(cls, body: Request | None) -> Request | None:
+        if body is not None and too_long(given_deadline(body), LONGEST_DEADLINE):
+            raise PydanticCustomError(
+                "deadline_too_long",
+                "Give a `deadline` of at most {most}",
+                {"most": f"{LONGEST_DEADLINE:g}"},
+            )
+        return body

@@ -8,7 +8,8 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from joulepath.app.api.cycle.request import CycleRequest, LongTime
-from joulepath.app.schemas.common import Request, described
+from joulepath.app.schemas.common import described
+from joulepath.app.schemas.deadline import WithBodies
 from joulepath.app.schemas.examples.values import ANSWER_ID, OPTIMIZE
 from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.app.schemas.request import OptimizeRequest
@@ -16,7 +17,7 @@ from joulepath.app.schemas.request import OptimizeRequest
 AdviceName = Literal["whole_cycle", "brakes", "without_home", "shorter_stops", "lighter_tool"]
 
 
-class AnsweredRequest(Request):
+class AnsweredRequest(WithBodies):
     """A motion or a cycle, as one of `optimize` and `cycle`, the id of its answer, and how often it
     comes."""
 

@@ -184,15 +184,20 @@ class _Work:
 
     end: Deadline
     motions: Mapping[str, bytes] = field(default_factory=dict)
+    whole: float = field(init=False)
+    """Time for all computations [s]."""
+
+    def __post_init__(self) -> None:
+        self.whole = self.end.left
 
     def advice(self, variant: Variant, instead_of: float) -> AdvisedChange | None:
         """A change, computed; None without a motion, or without the time for one."""
-        if self.end.left < variant.task.deadline / 2:
+        time = min(variant.task.deadline, self.whole)
+        if self.end.left < time / 2:
             return None
         try:
             with tool_of_mass(variant.tool):
-                limit = min(self.end.left, variant.task.deadline)
-                result = result_of(variant.task, "", limit, self.motions)
+                result = result_of(variant.task, "", min(self.end.left, time), self.motions)
         except DeclaredError:
             return None
         self.motions = {**self.motions, **result.motions}

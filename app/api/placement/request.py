@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from joulepath.app.api.cycle.request import CycleRequest, PlainName
 from joulepath.app.schemas.common import IDENTITY, Pose, Request, described
-from joulepath.app.schemas.deadline import DeadlineSeconds
+from joulepath.app.schemas.deadline import DeadlineSeconds, WithBodies
 from joulepath.app.schemas.examples.values import OPTIMIZE, at
 from joulepath.models.shape_sizes import SIZES
 from joulepath.optimizer.placement.map_axis import MAP
@@ -126,7 +126,7 @@ class Moving(Request):
     region: RegionOrPlaces = described("Admissible places of the body.", None, _REGION)
 
 
-class WeightedCycle(Request):
+class WeightedCycle(WithBodies):
     """A cycle, and how often it runs."""
 
     cycle: CycleRequest = described("A body of `POST /cycle`.", None, CYCLE)
@@ -140,7 +140,7 @@ class WeightedCycle(Request):
     )
 
 
-class PlacementRequest(Request):
+class PlacementRequest(WithBodies):
     """Cycles with stops and obstacles in the world frame, and the admissible places of the robot.
     Exactly one of `cycle` and `cycles` is given."""
 

@@ -30,7 +30,7 @@ from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import Request, described
-from joulepath.app.schemas.deadline import DeadlineSeconds
+from joulepath.app.schemas.deadline import DeadlineSeconds, WithBodies
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.values import EVALUATE, OPTIMIZE
 from joulepath.app.schemas.queries import Name
@@ -93,7 +93,7 @@ _Changes = Annotated[
 ]
 
 
-class WhatifRequest(Request):
+class WhatifRequest(WithBodies):
     """A motion, as exactly one of `optimize` and `evaluate`, and changes of its arm."""
 
     optimize: OptimizeRequest | None = described(

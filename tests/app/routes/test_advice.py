@@ -142,6 +142,29 @@ def test_advice_on_a_kept_answer_is_of_that_answer(client: TestClient) -> None:
     assert client.get("/answers").json()["answers"][0]["id"] == before, "nothing is kept"
 
 
+def test_a_long_deadline_of_the_motion_leaves_time_for_the_changes(client: TestClient) -> None:
+    """The deadline of the motion may exceed the time for all changes, as in a request of a job."""
+    found = advised(client, optimize=move(deadline=3000.0), period=6.0)
+    assert {"whole_cycle", "brakes"} <= by_name(found).keys()
+
+
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [
+        ("/advice", {"optimize": move(deadline=3601.0)}),
+        ("/report", {"optimize": move(deadline=3601.0)}),
+        ("/whatif", {"optimize": move(deadline=3601.0), "changes": []}),
+    ],
+)
+def test_a_deadline_beyond_all_limits_is_refused(
+    recorded: TestClient, path: str, body: Json
+) -> None:
+    errors = recorded.post(path, json=body).json()["errors"]
+    assert any(
+        error["loc"] == ["body", "optimize"] and "at most 3600" in error["msg"] for error in errors
+    )
+
+
 @pytest.mark.parametrize("body", [{}, {"optimize": move(), "cycle": CYCLE}])
 def test_other_bodies_are_refused(recorded: TestClient, body: Json) -> None:
     assert recorded.post("/advice", json=body).status_code == 422
