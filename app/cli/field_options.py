@@ -1,4 +1,4 @@
-"""Options of commands that are made from the fields of requests."""
+"""Options of commands, made from the fields of requests."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class Json(click.ParamType[dict[str, Any], Any]):
 
 
 class FieldCommand(click.Command):
-    """A command with an option for each of some fields of requests.
+    """A command with options made from fields of requests.
 
-    An option without a value is None, or empty if it may be repeated, and the field keeps its
-    default. The schema checks the range of a value.
+    An option without a value is None, or an empty tuple if repeatable; the field then keeps the
+    default of the schema. The schema also checks ranges.
     """
 
     def __init__(self, *args: Any, fields: Callable[[], Fields], **settings: Any) -> None:
@@ -49,21 +49,21 @@ class FieldCommand(click.Command):
 
         Args:
             args: arguments by position.
-            fields: returns the fields; called at the first use, because schemas take long to
-                import.
+            fields: function that returns the fields. Called at the first use, because the import
+                of schemas takes long.
             settings: arguments by name.
         """
         super().__init__(*args, **settings)
         self._fields = fields
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """The parameters of the command, then those of the fields."""
+        """Parameters of the command, then options of fields, then `--help`."""
         *own, help = super().get_params(ctx)
         return [*own, *self.field_options, help]
 
     @cached_property
     def field_options(self) -> list[click.Parameter]:
-        """The options of the fields."""
+        """Options of the fields, in order."""
         return [
             _option(name, model.model_fields[name])
             for model, names in self._fields().items()
@@ -72,7 +72,7 @@ class FieldCommand(click.Command):
 
 
 def given_fields(names: Sequence[str], options: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of these names that options give."""
+    """Values of the named fields, without options that have no value."""
     return {name: options[name] for name in names if options[name] not in (None, ())}
 
 
@@ -91,7 +91,7 @@ def _option(name: str, field: FieldInfo) -> click.Option:
 
 
 def _kind(annotation: Any) -> tuple[Any, bool]:
-    """The type of click for a value, and whether the option may be repeated."""
+    """The click type of a field's values, and whether the option is repeatable."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return _kind(arguments[0])

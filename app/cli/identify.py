@@ -26,6 +26,8 @@ FILE_ID = "file"
 """Stand-in for the ids of stored logs: those of a command are files."""
 
 
+# fields of requests with options of the same names: of the identification, of the friction terms
+# and of every log
 FITTED = (
     "fit",
     "method",
@@ -37,7 +39,6 @@ FITTED = (
 )
 FRICTION = ("knee",)
 LOGGED = ("robot", "units", "effort", "current_units", "torque_side", "columns")
-"""Fields of requests that are options of the same names."""
 LOG = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 

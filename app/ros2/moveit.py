@@ -22,20 +22,20 @@ from joulepath.optimizer.exceptions import DeclaredError
 
 
 class PlanServer(Protocol):
-    """A node that computes plans."""
+    """Methods of the planning node that the interface uses."""
 
     create_subscription: Callable[..., Any]
     create_service: Callable[..., Any]
 
     @property
     def planner(self) -> Planner | None:
-        """What computes the plans; None while no robot is known."""
+        """The planner; None before the robot is known."""
 
     def outcome(self, fields: Callable[[], Json]) -> Awaitable[Plan | Exception | Stopped]:
-        """A plan for the fields of a request, or its error."""
+        """The plan for the fields of a request, or the error of planning."""
 
     def refuse(self, error: DeclaredError) -> None:
-        """Publish a problem that belongs to no goal."""
+        """Publish an error outside of any goal."""
 
 
 class MoveitInterface:
