@@ -17,7 +17,7 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.presentation.chart import Chart
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.presentation.result import Result, Rows
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.progress import (
     CandidatesFound,

@@ -26,7 +26,7 @@ from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.presentation.result import Result, Rows, per_joint
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.search.ends import label_of
 

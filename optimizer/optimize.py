@@ -9,7 +9,7 @@ from joulepath.optimizer.dynamics.kernel import kernel_for
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.progress import Tell, no_listener, only_news

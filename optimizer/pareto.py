@@ -28,7 +28,7 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoT
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.presentation.progress_bar import progress_bar
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import (
     CandidatesFound,

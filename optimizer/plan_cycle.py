@@ -50,7 +50,7 @@ from joulepath.optimizer.feasible_answer import least_certified
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.progress import Improved, Tell, no_listener, only_improved, only_news
 
 

@@ -24,7 +24,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.presentation.chart import Chart
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.presentation.result import Result, Rows
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.problem.problem import Problem, narrowed
 from joulepath.optimizer.progress import Tell, no_listener
 from joulepath.optimizer.result.certificate import Certificate

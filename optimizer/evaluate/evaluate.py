@@ -42,7 +42,7 @@ from joulepath.optimizer.motion.quadrature import lobatto_panels
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.problem.scalars import check_number
 from joulepath.optimizer.progress import Steps, TellSteps, no_listener
 from joulepath.optimizer.result.energy import (

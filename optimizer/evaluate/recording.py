@@ -13,7 +13,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen
-from joulepath.optimizer.problem.scalars import check_choices
+from joulepath.optimizer.problem.declared_types import check_fields
 
 Interpolation = Literal["linear", "trapezoid", "quintic", "spline"]
 
@@ -70,7 +70,7 @@ class Waypoints:
     first_row: int = 0
 
     def __post_init__(self) -> None:
-        check_choices(self)
+        check_fields(self)
         if np.ndim(self.q) != 2 or len(self.q) < 2:
             raise InvalidProblem(
                 "configurations", "configurations must be a list of two or more joint positions."

@@ -13,8 +13,9 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.presentation import bounds_in_words
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen, per_joint
+from joulepath.optimizer.problem.declared_types import check_fields
 from joulepath.optimizer.problem.problem import DURATIONS
-from joulepath.optimizer.problem.scalars import check_choices, check_number
+from joulepath.optimizer.problem.scalars import check_number
 from joulepath.optimizer.problem.uncoupled import check_uncoupled
 
 Part = Literal["inertials", "rotor", "friction"]
@@ -102,7 +103,7 @@ class ExcitationProblem:
             raise InvalidProblem(
                 "parameters", f"parameters must name some of {', '.join(get_args(Part))}."
             )
-        check_choices(self)
+        check_fields(self)
         if self.arm.tool_cone is not None:
             raise InvalidProblem(
                 "tool_cone", "An excitation turns the tool in every direction: leave tool_cone out."

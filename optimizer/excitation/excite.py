@@ -38,7 +38,7 @@ from joulepath.optimizer.excitation.torque_columns import TorqueColumns
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.spline import Spline, retimed
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import HalfSpace, Obstacle, Scene
 from joulepath.optimizer.progress import Steps, TellSteps, no_listener

@@ -28,7 +28,7 @@ from joulepath.optimizer.export.rapid import RapidOptions, to_rapid
 from joulepath.optimizer.export.ros_messages import MoveitOptions, Ros2Options, to_moveit, to_ros2
 from joulepath.optimizer.export.rows import TableOptions
 from joulepath.optimizer.export.urscript import UrscriptOptions, to_urscript
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scalars import check_choice, check_number
 from joulepath.optimizer.result.solution import Solution

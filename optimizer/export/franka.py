@@ -16,7 +16,7 @@ from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.facts import WrittenFile, check_joints, header
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.export.rows import TABLE, ticks
-from joulepath.optimizer.problem.scalars import check_choices
+from joulepath.optimizer.problem.declared_types import check_fields
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class FrankaOptions:
     """A table as CSV, or a C++ header with a motion generator."""
 
     def __post_init__(self) -> None:
-        check_choices(self)
+        check_fields(self)
 
 
 def to_franka(program: Program, options: FrankaOptions | None = None) -> WrittenFile:

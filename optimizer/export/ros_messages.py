@@ -17,7 +17,8 @@ from joulepath.optimizer.export.facts import WrittenFile, header
 from joulepath.optimizer.export.option_ranges import OPTION_RANGES
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.export.quintic_points import QuinticPoints, quintic_points
-from joulepath.optimizer.problem.scalars import check_choices, check_text
+from joulepath.optimizer.problem.declared_types import check_fields
+from joulepath.optimizer.problem.scalars import check_text
 
 Encoding = Literal["yaml", "json"]
 
@@ -48,7 +49,7 @@ class Ros2Options:
     """Prefix of all joint names."""
 
     def __post_init__(self) -> None:
-        check_choices(self)
+        check_fields(self)
         check_text("controller", self.controller, OPTION_RANGES.controller)
         check_text("prefix", self.prefix, OPTION_RANGES.prefix)
 
@@ -62,7 +63,7 @@ class MoveitOptions:
     """Prefix of all joint names."""
 
     def __post_init__(self) -> None:
-        check_choices(self)
+        check_fields(self)
         check_text("prefix", self.prefix, OPTION_RANGES.prefix)
 
 

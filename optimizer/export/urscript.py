@@ -26,7 +26,8 @@ from joulepath.optimizer.export.program import Move, Program, Timed
 from joulepath.optimizer.export.urscript_parts import CHECKS, serving
 from joulepath.optimizer.motion.spline import peak_rates
 from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.scalars import check_choices, check_within
+from joulepath.optimizer.problem.declared_types import check_fields
+from joulepath.optimizer.problem.scalars import check_within
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class UrscriptOptions:
     nothing."""
 
     def __post_init__(self) -> None:
-        check_choices(self)
+        check_fields(self)
         check_within("lookahead_time", self.lookahead_time, OPTION_RANGES.lookahead_time, "seconds")
         check_within("gain", self.gain, OPTION_RANGES.gain)
         if self.digital_output is not None:

@@ -54,7 +54,7 @@ from joulepath.optimizer.presentation.declared_fields import shown_fields
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.presentation.result import Result
 from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.problem.uncoupled import check_uncoupled
 from joulepath.optimizer.progress import Steps, TellSteps, no_listener
 

@@ -11,7 +11,8 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Method, Target, Term
-from joulepath.optimizer.problem.scalars import check_choices, check_number
+from joulepath.optimizer.problem.declared_types import check_fields
+from joulepath.optimizer.problem.scalars import check_number
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +84,7 @@ class IdentificationOptions:
                     name, f"{name} must name some of {', '.join(allowed)}, each once."
                 )
             object.__setattr__(self, name, given)
-        check_choices(self)
+        check_fields(self)
         if self.refit and self.links_unknown:
             raise InvalidProblem(
                 "inertials",

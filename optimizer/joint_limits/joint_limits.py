@@ -21,7 +21,7 @@ from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.presentation.equality import same
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.problem.uncoupled import check_uncoupled
 
 

@@ -28,7 +28,7 @@ from joulepath.optimizer.placement.space import Place, Space
 from joulepath.optimizer.presentation.gap import optimality_gap
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.progress import Tell, no_listener, only_news
 
 

@@ -13,7 +13,7 @@ from joulepath.optimizer.placement.region import Group, Moved, Region
 from joulepath.optimizer.problem.arrays import placement
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import START, Cycle
-from joulepath.optimizer.problem.parts import check_parts
+from joulepath.optimizer.problem.declared_types import check_fields
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.scalars import check_number
 from joulepath.optimizer.problem.targets import Target, members
@@ -58,7 +58,7 @@ class WeightedCycle:
     weight: float = 1.0
 
     def __post_init__(self) -> None:
-        check_parts(self)
+        check_fields(self)
         check_number("weight", self.weight, most=PLACEMENT_RANGES.max_weight, positive=True)
 
 
@@ -85,7 +85,7 @@ class Placement:
     deadline: float = 120.0
 
     def __post_init__(self) -> None:
-        check_parts(self)
+        check_fields(self)
         object.__setattr__(self, "cycles", tuple(self.cycles))
         object.__setattr__(self, "moved", tuple(self.moved))
         object.__setattr__(self, "base", placement(self.base, "base"))

@@ -15,8 +15,8 @@ from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
 from joulepath.optimizer.presentation import bounds_in_words
 from joulepath.optimizer.problem.arrays import frozen, per_joint, rigid_transform
 from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.declared_types import check_fields
 from joulepath.optimizer.problem.names import first_taken
-from joulepath.optimizer.problem.parts import check_parts
 from joulepath.optimizer.problem.scalars import check_number, check_speed
 from joulepath.optimizer.problem.scene import Attachment, Scene
 from joulepath.optimizer.problem.tool_cone import ToolCone
@@ -71,7 +71,7 @@ class Payload:
     shape: Attachment | None = None
 
     def __post_init__(self) -> None:
-        check_parts(self, "payload.")
+        check_fields(self, "payload.")
         check_number("payload.mass", self.mass, "kilograms")
         # Pinocchio takes no number of numpy's other types
         object.__setattr__(self, "mass", float(self.mass))
@@ -157,7 +157,7 @@ class Arm:
     elbow_speed: float | None = None
 
     def __post_init__(self) -> None:
-        check_parts(self)
+        check_fields(self)
         object.__setattr__(self, "T_flange_tcp", rigid_transform(self.T_flange_tcp, "tcp"))
         gravity = self.gravity
         if gravity is None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Literal
 
-from joulepath.optimizer.problem.scalars import check_choices
+from joulepath.optimizer.problem.declared_types import check_fields
 
 Shoulder = Literal["left", "right"]
 Elbow = Literal["up", "down"]
@@ -72,7 +72,7 @@ class BranchFilter:
     wrist: Wrist | None = None
 
     def __post_init__(self) -> None:
-        check_choices(self, "branch.")
+        check_fields(self, "branch.")
 
     def allows(self, label: object, singular: Sequence[str] = ()) -> bool:
         """Whether the filter allows a configuration.

@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.problem.scalars import check_choices, check_number
+from joulepath.optimizer.problem.declared_types import check_fields
+from joulepath.optimizer.problem.scalars import check_number
 
 BusMode = Literal["shared", "isolated", "recuperating", "storage"]
 
@@ -36,7 +37,7 @@ class Bus:
     initial: float = 0.0
 
     def __post_init__(self) -> None:
-        check_choices(self, "bus.")
+        check_fields(self, "bus.")
         check_number("bus.efficiency", self.efficiency, most=1.0)
         check_number("bus.capacity", self.capacity, "joules")
         check_number("bus.power", self.power, "watts", positive=True, infinite=True)

@@ -16,7 +16,6 @@ from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.dwell import Dwell, Hold, check_holding
 from joulepath.optimizer.problem.free_order import FreeOrder, check_order
 from joulepath.optimizer.problem.names import check_name, first_repeated
-from joulepath.optimizer.problem.parts import check_parts
 from joulepath.optimizer.problem.problem import (
     DURATIONS,
     BoundEffort,
@@ -120,7 +119,6 @@ class Cycle:
     deadline: float = 60.0
 
     def __post_init__(self) -> None:
-        check_parts(self)
         check_search(self)
         object.__setattr__(self, "stops", tuple(self.stops))
         if not 1 <= len(self.stops) <= CYCLE_RANGES.max_stops:

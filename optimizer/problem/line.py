@@ -10,7 +10,8 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import frozen
-from joulepath.optimizer.problem.scalars import check_choices, check_number, check_speed
+from joulepath.optimizer.problem.declared_types import check_fields
+from joulepath.optimizer.problem.scalars import check_number, check_speed
 
 LineFrame = Literal["tcp", "base"]
 
@@ -57,7 +58,7 @@ class Line:
             )
         least, most = LINE_RANGES.least_distance, LINE_RANGES.greatest_distance
         check_number("distance", self.distance, "metres", least=least, most=most)
-        check_choices(self)
+        check_fields(self)
         check_speed("speed", self.speed)
 
     def shift(self, T_base_tcp: Array) -> Array:

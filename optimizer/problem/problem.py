@@ -13,9 +13,9 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.declared_types import check_fields
 from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.parts import check_parts
-from joulepath.optimizer.problem.scalars import check_choices, check_number
+from joulepath.optimizer.problem.scalars import check_number
 from joulepath.optimizer.problem.targets import AnyOf, Target, members, validated
 from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.problem.uncoupled import check_uncoupled
@@ -90,13 +90,12 @@ class Problem:
     deadline: float = 10.0
 
     def __post_init__(self) -> None:
-        check_parts(self)
+        check_search(self)
         for name in ("start", "goal"):
             end = validated(
                 self.arm, name, getattr(self, name), free_start=self.tool_path is not None
             )
             object.__setattr__(self, name, end)
-        check_search(self)
         for name in ("duration_min", "duration_max"):
             check_number("duration", getattr(self, name), "seconds", positive=True, optional=True)
         if (
@@ -162,6 +161,6 @@ def check_search(asked: Any) -> None:
     Raises:
         InvalidProblem: one is unknown or out of range; names the field.
     """
-    check_choices(asked)
+    check_fields(asked)
     check_number("sample_period", asked.sample_period, "seconds", least=DURATIONS.least_period)
     check_number("deadline", asked.deadline, "seconds", positive=True)

@@ -1,14 +1,13 @@
-"""Checks of a problem's numbers and choices; their errors name the field."""
+"""Checks of numbers, texts and choices in a request; errors name the field."""
 
 from __future__ import annotations
 
-from functools import cache
 from itertools import chain
 from numbers import Real
 from re import fullmatch
 from reprlib import repr as short
 from types import NoneType, UnionType
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, Union, get_args, get_origin
 
 import numpy as np
 
@@ -26,10 +25,10 @@ def check_number(
     infinite: bool = False,
     optional: bool = False,
 ) -> None:
-    """Check that a value is a number within a range.
+    """Check that a value is a number within a range. NaN is refused.
 
     Args:
-        field: name of the field, for the error.
+        field: name of the field in the error.
         value: the value.
         unit: unit of the number in words, for the error; empty for a ratio.
         least: smallest number allowed.
@@ -39,7 +38,7 @@ def check_number(
         optional: whether None is allowed.
 
     Raises:
-        InvalidProblem: the value is no such number.
+        InvalidProblem: the value is no number, or out of range.
     """
     if optional and value is None:
         return
@@ -56,7 +55,11 @@ def check_number(
 
 
 def check_within(field: str, value: object, range: tuple[float, float], unit: str = "") -> None:
-    """Check that a value is a number between the ends of a range. Raises InvalidProblem if not."""
+    """Check that a value is a number between the ends of a range.
+
+    Raises:
+        InvalidProblem: the value is no number, or out of range.
+    """
     least, most = range
     check_number(field, value, unit, least=least, most=most)
 
@@ -65,13 +68,53 @@ def check_speed(field: str, value: object, least: float = 0.0) -> None:
     """Check an optional speed of a point of the arm [m/s]: above zero, and `least` or more.
 
     Raises:
-        InvalidProblem: it is no such number.
+        InvalidProblem: the value is no number, or out of range.
     """
     check_number(field, value, "metres per second", least=least, positive=least == 0, optional=True)
 
 
+def check_text(field: str, value: object, pattern: str) -> None:
+    """Check that a regular expression matches a whole text.
+
+    Raises:
+        InvalidProblem: the value is no text, or has another form.
+    """
+    if not (isinstance(value, str) and fullmatch(pattern, value)):
+        raise InvalidProblem(field, f"{field} must match {pattern}, not {short(value)}.")
+
+
+def check_choice(field: str, value: object, choices: Any) -> None:
+    """Check that a value is among the literals of a type.
+
+    Args:
+        field: name of the field in the error.
+        value: the value.
+        choices: a `Literal`, or a union of literals and None.
+
+    Raises:
+        InvalidProblem: the value is no literal of the type.
+    """
+    known = literals_of(choices)
+    # comparisons of arrays with text have no truth value
+    if not (isinstance(value, str | int | NoneType) and value in known):
+        named = ", ".join(str(choice) for choice in known if choice is not None)
+        raise InvalidProblem(field, f"{field} must be one of {named}, not {short(value)}.")
+
+
+def literals_of(hint: Any) -> tuple[object, ...]:
+    """Values of a type made of literals and None; empty for another type."""
+    if hint is NoneType:
+        return (None,)
+    if get_origin(hint) is Literal:
+        return get_args(hint)
+    if get_origin(hint) not in (Union, UnionType):
+        return ()
+    parts = [literals_of(part) for part in get_args(hint)]
+    return tuple(chain(*parts)) if all(parts) else ()
+
+
 def _as_float(value: object) -> float:
-    """The value if it is a real number, else NaN; infinity for an integer that is too large."""
+    """A real number as float, infinity for a larger integer, NaN for everything else."""
     if not isinstance(value, Real):
         return np.nan
     try:
@@ -88,64 +131,3 @@ def _described(unit: str, least: float, most: float, positive: bool) -> str:
     if positive:
         return f"a positive {number}"
     return f"a {number}, {least:g} or more" if np.isfinite(least) else f"a {number}"
-
-
-def check_text(field: str, value: object, pattern: str) -> None:
-    """Check that a value is a text that a regular expression matches as a whole.
-
-    Raises:
-        InvalidProblem: it is not.
-    """
-    if not (isinstance(value, str) and fullmatch(pattern, value)):
-        raise InvalidProblem(field, f"{field} must match {pattern}, not {short(value)}.")
-
-
-def check_choice(field: str, value: object, choices: Any) -> None:
-    """Check that a value is one of those of a type made of literals.
-
-    Args:
-        field: name of the field, for the error.
-        value: the value.
-        choices: the type, a `Literal` or a union of literals and None.
-
-    Raises:
-        InvalidProblem: the value is none of them.
-    """
-    known = _values(choices)
-    # comparisons of arrays with text have no truth value
-    if not (isinstance(value, str | int | NoneType) and value in known):
-        named = ", ".join(str(each) for each in known if each is not None)
-        raise InvalidProblem(field, f"{field} must be one of {named}, not {short(value)}.")
-
-
-def check_choices(asked: Any, prefix: str = "") -> None:
-    """Check all fields of a dataclass whose types are made of literals.
-
-    Args:
-        asked: an instance of the dataclass.
-        prefix: what precedes the names of its fields in errors.
-
-    Raises:
-        InvalidProblem: a value is none of its literals; names the field.
-    """
-    kind: Any = type(asked)
-    for name, choices in _literal_fields(kind).items():
-        check_choice(prefix + name, getattr(asked, name), choices)
-
-
-@cache
-def _literal_fields(kind: type) -> dict[str, Any]:
-    """Types of the fields of a dataclass that are made of literals."""
-    return {name: hint for name, hint in get_type_hints(kind).items() if _values(hint)}
-
-
-def _values(hint: Any) -> tuple[object, ...]:
-    """Values of a type made of literals and None; empty for another type."""
-    if hint is NoneType:
-        return (None,)
-    if get_origin(hint) is Literal:
-        return get_args(hint)
-    if get_origin(hint) not in (Union, UnionType):
-        return ()
-    parts = [_values(part) for part in get_args(hint)]
-    return tuple(chain(*parts)) if all(parts) else ()

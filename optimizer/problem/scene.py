@@ -12,8 +12,8 @@ from joulepath.models.shape_sizes import SIZES, hull_of_body
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import check_size, frozen, placement, sized
 from joulepath.optimizer.problem.clouds import CLOUD_RANGES, Cloud, parts_of
+from joulepath.optimizer.problem.declared_types import check_fields
 from joulepath.optimizer.problem.names import check_name, first_repeated
-from joulepath.optimizer.problem.parts import check_parts
 from joulepath.optimizer.problem.scalars import check_number
 
 
@@ -132,7 +132,7 @@ class Obstacle:
     margin: float = SCENE_RANGES.default_margin
 
     def __post_init__(self) -> None:
-        check_parts(self)
+        check_fields(self)
         check_name("name", self.name)
         check_number("margin", self.margin, "metres", most=SCENE_RANGES.greatest_margin)
         object.__setattr__(self, "T_base_shape", placement(self.T_base_shape, "pose"))
@@ -182,7 +182,7 @@ class Scene:
     obstacles: Sequence[Obstacle] = ()
 
     def __post_init__(self) -> None:
-        check_parts(self, "scene.")
+        check_fields(self, "scene.")
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         if len(self.obstacles) > SCENE_RANGES.max_obstacles:
             raise InvalidProblem(

@@ -11,8 +11,9 @@ import numpy as np
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import unit_vector
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.declared_types import check_fields
 from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.scalars import check_choices, check_number, check_speed
+from joulepath.optimizer.problem.scalars import check_number, check_speed
 
 PathShape = Literal["lines", "curve", "arc"]
 MOST_POINTS: dict[PathShape, int] = {"lines": 20, "curve": 500, "arc": 1}
@@ -100,7 +101,7 @@ class ToolPath:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "via", tuple(self.via))
-        check_choices(self, "path.")
+        check_fields(self, "path.")
         most = MOST_POINTS[self.shape]
         if len(self.via) > most:
             raise InvalidProblem(

@@ -19,7 +19,7 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scalars import check_choice, check_number
 from joulepath.optimizer.progress import Steps, TellSteps, no_listener

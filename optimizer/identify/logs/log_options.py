@@ -11,7 +11,7 @@ from joulepath.optimizer.identify.logs.columns import ColumnMap
 from joulepath.optimizer.identify.logs.file_rows import FILE
 from joulepath.optimizer.identify.logs.log import EffortMeaning
 from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.scalars import check_choices
+from joulepath.optimizer.problem.declared_types import check_fields
 
 
 @dataclass(frozen=True)
@@ -43,4 +43,4 @@ class LogOptions:
     """Largest size of the file after unpacking [bytes]."""
 
     def __post_init__(self) -> None:
-        check_choices(self)
+        check_fields(self)

@@ -39,7 +39,7 @@ from joulepath.optimizer.identify.logs.moves import cut_into_moves, rests_by_com
 from joulepath.optimizer.identify.logs.speeds import speeds_of
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.arrays import frozen
-from joulepath.optimizer.problem.parts import checked_arguments
+from joulepath.optimizer.problem.declared_types import checked_arguments
 
 
 @dataclass(frozen=True)
