@@ -14,9 +14,9 @@ from joulepath.optimizer.export.formats import FormatName
 from joulepath.optimizer.export.option_ranges import OPTION_RANGES
 from joulepath.optimizer.export.ros_messages import Encoding
 
-RANGES = OPTION_RANGES
 PREFIX, CONTROLLER, SIGNAL = (
-    f"^{pattern}$" for pattern in (RANGES.prefix, RANGES.controller, RANGES.signal)
+    f"^{pattern}$"
+    for pattern in (OPTION_RANGES.prefix, OPTION_RANGES.controller, OPTION_RANGES.signal)
 )
 ENCODING = "`yaml` or `json`. Null: `json` if the header `Accept` asks for it, else `yaml`."
 
@@ -25,7 +25,7 @@ class TableOptions(Request):
     """Options of `csv` and `npz`."""
 
     period: float = described(
-        "Time between two rows.", "s", 0.004, default=0.008, **between(RANGES.period)
+        "Time between two rows.", "s", 0.004, default=0.008, **between(OPTION_RANGES.period)
     )
 
 
@@ -59,16 +59,18 @@ class UrscriptOptions(Request):
         "s",
         0.05,
         default=0.1,
-        **between(RANGES.lookahead_time),
+        **between(OPTION_RANGES.lookahead_time),
     )
-    gain: float = described("servoj's `gain`.", "1", 500.0, default=300.0, **between(RANGES.gain))
+    gain: float = described(
+        "servoj's `gain`.", "1", 500.0, default=300.0, **between(OPTION_RANGES.gain)
+    )
     digital_output: int | None = described(
         "Standard digital output that is on from each grasp to the release. Null: none is "
         "switched.",
         None,
         0,
         default=None,
-        **between(RANGES.standard_output),
+        **between(OPTION_RANGES.standard_output),
     )
 
 
@@ -131,7 +133,7 @@ class PointsOptions(Request):
         "rad",
         0.002,
         default=0.005,
-        **between(RANGES.tolerance),
+        **between(OPTION_RANGES.tolerance),
     )
     signs: Annotated[list[Literal[1, -1]], Field(min_length=1, max_length=16)] | None = described(
         "Sense of the controller's axes against the joints of the robot's model, one per joint. "
@@ -142,7 +144,7 @@ class PointsOptions(Request):
     )
     offsets: (
         Annotated[
-            list[Annotated[float, Field(**between(RANGES.offset))]],
+            list[Annotated[float, Field(**between(OPTION_RANGES.offset))]],
             Field(min_length=1, max_length=16),
         ]
         | None
@@ -176,7 +178,7 @@ class KrlOptions(PointsOptions):
         None,
         1,
         default=None,
-        **between(RANGES.krl_output),
+        **between(OPTION_RANGES.krl_output),
     )
 
 
