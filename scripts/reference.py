@@ -39,7 +39,7 @@ _COMMON = {"type", "title", "status", "detail", "instance"}
 _TABLE = re.compile(
     r"(<!-- fields of (\w+)(?:: ([\w ]+))? -->\n\n).*?(<!-- end of fields -->)", re.DOTALL
 )
-_LENGTHS = {"minItems": "at least", "maxItems": "at most"}
+_LENGTHS = {"minItems": "≥", "maxItems": "≤"}
 
 
 def reference(document: dict[str, Any]) -> str:
@@ -158,7 +158,10 @@ def _type(node: dict[str, Any], page: str = "") -> str:
     if "enum" in node:
         return ", ".join(f"`{json.dumps(value)}`" for value in node["enum"])
     if node.get("type") == "array":
-        return f"list of {_type(node['items'], page)}" if "items" in node else "list"
+        entry = _type(node["items"], page) if "items" in node else ""
+        # the null of a list is not the null of its entries
+        entry = f"({entry})" if " or " in entry or ", " in entry else entry
+        return f"list of {entry}" if entry else "list"
     return str(node.get("type", "any"))
 
 
@@ -181,7 +184,13 @@ def _limits(field: str, node: dict[str, Any], required: set[str]) -> str:
 def _words(node: dict[str, Any]) -> Iterator[str]:
     for part in (node, *node.get("anyOf", ())):
         yield from (f"{sign} {part[name]:g}" for name, sign in _RANGES.items() if name in part)
-        yield from (f"{words} {part[name]}" for name, words in _LENGTHS.items() if name in part)
+        least, most = part.get("minItems"), part.get("maxItems")
+        if least is not None and least == most:
+            yield f"length {least}"
+            continue
+        yield from (
+            f"length {sign} {part[name]}" for name, sign in _LENGTHS.items() if name in part
+        )
 
 
 def _cell(text: str) -> str:
