@@ -39,10 +39,10 @@ def too_long(given: float | None, longest: float, *where: str | int) -> list[Fie
 
 
 class WithBodies(Request):
-    """A request that contains bodies of other requests.
+    """A request with bodies of other requests.
 
-    The deadlines of these bodies are limited by that of the whole. They may exceed it, so that the
-    request of a job can be sent on, but not the longest deadline of jobs.
+    The deadline of the whole request also ends the work on its bodies. A body may nevertheless have
+    a longer deadline, as a body taken from a job does: up to the longest deadline of jobs.
     """
 
     @field_validator("optimize", "cycle", "evaluate", "placement", check_fields=False)
