@@ -8,6 +8,7 @@ import errno
 import logging
 import math
 import os
+import re
 import socket
 import sys
 import threading
@@ -52,6 +53,8 @@ SERVER = ServerSettings()
 
 _OTHER_VARIABLES = ("CACHE_DIR", "URL", "API_KEY")
 """Variables with the prefix of the settings that the library and the commands read."""
+_SERVICE_LINKS = re.compile(r"SERVICE_(HOST|PORT)(_.*)?|PORT_[0-9]+_.*")
+"""Variables that Kubernetes sets in the pods beside a service named `joulepath`."""
 _M_MMAP_THRESHOLD = -3
 """Parameter of glibc's `mallopt`: the least size of separately mapped blocks [byte]."""
 _REMEDIES = {
@@ -104,7 +107,8 @@ def log_unknown_variables(environment: Mapping[str, str]) -> None:
     known = {*(name.upper() for name in Settings.model_fields), *_OTHER_VARIABLES}
     for variable in sorted(environment):
         name = variable.upper().removeprefix(prefix)
-        if variable.upper().startswith(prefix) and name not in known:
+        is_known = name in known or _SERVICE_LINKS.fullmatch(name)
+        if variable.upper().startswith(prefix) and not is_known:
             meant = nearest(name, known)
             remedy = "unset it" if meant is None else f"did you mean {prefix}{meant.upper()}?"
             logger.warning("unknown setting", extra={"variable": variable, "remedy": remedy})

@@ -27,6 +27,8 @@ _NAMES = {
 """Settings with lists of names: the form of a name, and the end of the error message."""
 _PASSWORD = re.compile(r"(?<=//).*(?=@)")
 _SCHEDULER = re.compile(r"(tcp|tls)://[A-Za-z0-9._:\[\]-]+:[0-9]{1,5}")
+SERVICE_LINK = re.compile(r"(tcp|udp|sctp)://[^/]+:[0-9]+")
+"""What Kubernetes sets as `JOULEPATH_PORT` in the pods beside a service named `joulepath`."""
 LONGEST_DEADLINE = 3600.0
 """Longest deadline [s] of all settings."""
 
@@ -245,6 +247,14 @@ class Settings(BaseSettings):
     def workers_for_jobs(self) -> int:
         """Workers available to jobs at the same time."""
         return min(self.job_workers or max(1, self.workers - 1), self.workers)
+
+    @field_validator("port", mode="before")
+    @classmethod
+    def _unless_link(cls, given: Any) -> Any:
+        """`PORT` or the default in place of the address of a Kubernetes service."""
+        if isinstance(given, str) and SERVICE_LINK.fullmatch(given):
+            return os.environ.get("PORT", cls.model_fields["port"].default)
+        return given
 
     @field_validator("robots", "trusted_proxies", "allowed_hosts", "cors_origins", mode="before")
     @classmethod

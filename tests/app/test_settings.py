@@ -39,6 +39,24 @@ def test_a_variable_that_sets_nothing_is_named(caplog: pytest.LogCaptureFixture)
     ]
 
 
+def test_variables_of_a_kubernetes_service_of_this_name_are_ignored(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    links = {
+        "JOULEPATH_PORT": "tcp://10.96.0.7:8000",
+        "JOULEPATH_SERVICE_HOST": "10.96.0.7",
+        "JOULEPATH_SERVICE_PORT_HTTP": "8000",
+        "JOULEPATH_PORT_8000_TCP_ADDR": "10.96.0.7",
+    }
+    for name, value in links.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.delenv("PORT", raising=False)
+    log_unknown_variables(links)
+    assert read_settings().port == 8000 and not caplog.records
+    monkeypatch.setenv("PORT", "9000")
+    assert read_settings().port == 9000
+
+
 def test_every_wrong_variable_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in {
         "JOULEPATH_PORT": "http",
