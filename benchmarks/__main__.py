@@ -1,4 +1,4 @@
-"""All benchmarks in one run of about twenty minutes on two cores; prints a report.
+"""All benchmarks in one run of about fifteen minutes on two cores; prints a report.
 
     make bench                                all sections
     make bench BENCH_ARGS=--write             also writes benchmarks/RESULTS.md with its plot
