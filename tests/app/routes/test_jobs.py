@@ -162,20 +162,12 @@ def test_events_tell_the_whole_story_and_resume(client: TestClient, mixed: Any) 
     assert list(parsed(iter(everything))) == found
 
 
-def test_jobs_are_listed(recorded: TestClient) -> None:
-    paths = [sent(recorded, [evaluation()]) for _ in range(3)]
-    for path in paths:
-        ended(recorded, path)
-    found, after = [], ""
-    while True:
-        answer = recorded.get(f"/jobs?state=done&limit=2{after}")
-        page = JobList.model_validate_json(answer.content)
-        found += [f"/jobs/{job.id}" for job in page.jobs]
-        if page.next is None:
-            break
-        after = f"&after={page.next}"
-    assert found[:3] == paths[::-1]
-    assert len(set(found)) == len(found)
+def test_jobs_are_listed_by_their_state(recorded: TestClient) -> None:
+    path = sent(recorded, [evaluation()])
+    ended(recorded, path)
+    answer = recorded.get("/jobs", params={"state": "done", "limit": 1})
+    (job,) = JobList.model_validate_json(answer.content).jobs
+    assert path == f"/jobs/{job.id}"
     assert recorded.get("/jobs?state=cancelling").json() == {"jobs": [], "next": None}
 
 
@@ -229,19 +221,6 @@ def test_a_key_makes_one_job(recorded: TestClient) -> None:
         recorded.post("/optimize", json=move(), headers=LATER | {"Idempotency-Key": "jobs-1"}),
         KeyReused,
     )
-
-
-def test_unknown_jobs(recorded: TestClient) -> None:
-    for path in (ABSENT, "/jobs/no%00such", "/jobs/x"):
-        answers = [
-            recorded.get(path),
-            recorded.get(f"{path}/events"),
-            recorded.get(f"{path}/results"),
-            recorded.delete(path),
-        ]
-        answers += [recorded.post(f"{path}/{word}") for word in ("cancel", "retry")]
-        for answer in answers:
-            refused(answer, UnknownJob)
 
 
 def test_an_ended_job_is_retried_or_deleted_but_not_cancelled(client: TestClient) -> None:

@@ -92,14 +92,19 @@ def test_a_robot_is_searched_for(recorded: TestClient, things: str) -> None:
     assert recorded.get(f"/{things}", params={"search": "ur10"}).json()[things] == []
 
 
-def test_a_search_has_pages(recorded: TestClient) -> None:
-    name, ids = f"Shift {uuid4().hex[:6]}", [add_log(recorded) for _ in range(3)]
+@pytest.mark.parametrize("things", ADD)
+def test_pages_of_a_search_hold_everything_once(recorded: TestClient, things: str) -> None:
+    """The newest comes first."""
+    name, ids = f"Shift {uuid4().hex[:6]}", [ADD[things][0](recorded) for _ in range(3)]
     for id in ids:
-        recorded.patch(f"/logs/{id}", json={"name": name})
+        recorded.patch(f"/{things}/{id}", json={"name": name})
     query: dict[str, Any] = {"limit": 2, "search": name}
-    first = recorded.get("/logs", params=query).json()
-    rest = recorded.get("/logs", params=query | {"after": first["next"]}).json()
-    assert [each["id"] for each in first["logs"] + rest["logs"]] == ids[::-1]
+    first = recorded.get(f"/{things}", params=query).json()
+    rest = recorded.get(f"/{things}", params=query | {"after": first["next"]}).json()
+    assert [[each["id"] for each in page[things]] for page in (first, rest)] == [
+        ids[:0:-1],
+        ids[:1],
+    ]
     assert rest["next"] is None
 
 

@@ -23,7 +23,7 @@ from joulepath.app.api.logs.models import LogDetail, LogList
 from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.exceptions.access import NotOwner, Role, RoleTooLow, Unauthenticated
 from joulepath.app.exceptions.stored import TooManyLogs, UnknownLog
-from joulepath.app.exceptions.transport import BodyTooLarge, UnsupportedMediaType
+from joulepath.app.exceptions.transport import BodyTooLarge
 from joulepath.app.schemas.examples.bodies import LOG_EXAMPLES
 from joulepath.app.schemas.examples.own_arm import ARM
 from tests.app.access.test_key_file import add
@@ -78,18 +78,6 @@ def test_what_is_stored_is_read_again_as_it_was(recording: Recording) -> None:
         "log", {"robot": "ur5e", "tags": [], "effort": "auto"}, gzip.compress(csv_of(recording))
     ).reading.log
     assert np.abs(log.q - recording.q).max() < 1e-7 and log.effort_meaning == "current"
-
-
-def test_pages(client: TestClient) -> None:
-    body = LOG_EXAMPLES["positions"]["value"]
-    made = [client.post("/logs", content=body, headers=CSV).json()["id"] for _ in range(3)]
-    first = client.get("/logs", params={"limit": 2}).json()
-    assert [each["id"] for each in first["logs"]] == made[:0:-1]
-    second = client.get("/logs", params={"limit": 2, "after": first["next"]}).json()
-    assert second["logs"][0]["id"] == made[0]
-    refused(client.get("/logs", params={"after": "nowhere"}), InvalidRequest)
-    for each in made:
-        client.delete(f"/logs/{each}")
 
 
 @pytest.mark.parametrize("how", ["Content-Encoding", "Content-Type", "nothing"])
@@ -149,13 +137,6 @@ WRONG: list[tuple[str, list[str]]] = [
 def test_wrong_settings(client: TestClient, query: str, loc: list[str]) -> None:
     content = refused(client.post(f"/logs?{query}", content="t,q1\n", headers=CSV), InvalidRequest)
     assert [error["loc"] for error in content["errors"]] == [loc]
-
-
-def test_other_media_types(client: TestClient) -> None:
-    refused(
-        client.post("/logs", content="{}", headers={"Content-Type": "application/json"}),
-        UnsupportedMediaType,
-    )
 
 
 def test_limits_of_size_and_number(recording: Recording) -> None:

@@ -16,16 +16,13 @@ from joulepath import (
     OutsideLimits,
     SingularPose,
     TorqueInfeasible,
-    UnknownRobot,
     UnreachablePose,
-    robot_names,
 )
 from joulepath.app.api.ik.task import IKRequest, IKTask
 from joulepath.app.exceptions.base import InternalError
-from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.app.exceptions.queue import NotReady
 from joulepath.app.exceptions.transport import BodyTooLarge, MethodNotAllowed, NotFound
-from joulepath.app.http.problems import own_fields, path_of, problem_of
+from joulepath.app.http.problems import path_of, problem_of
 from joulepath.app.main import create_app
 from joulepath.app.settings import Settings
 from joulepath.optimizer.exceptions import DeclaredError
@@ -55,18 +52,6 @@ UPRIGHT = {"position": [0.0, -0.2329, 1.0794], "rpy": [1.5707963267948966, 0.0, 
 
 def to_pose(position: list[float], quaternion: list[float] = DOWN) -> dict[str, Any]:
     return move(goal={"pose": {"position": position, "quaternion": quaternion}})
-
-
-def test_unknown_robot(client: TestClient) -> None:
-    pose = {"position": [0.4, -0.2, 0.3], "quaternion": DOWN}
-    answers = [
-        client.post("/optimize", json=move(robot="r2d2")),
-        client.post("/ik", json={"robot": "r2d2", "pose": pose}),
-        client.get("/robots/r2d2"),
-    ]
-    for answer in answers:
-        assert refused(answer, UnknownRobot)["known"][: len(robot_names())] == list(robot_names())
-        assert "r2d2" not in answer.text
 
 
 def test_unreachable_pose(client: TestClient) -> None:
@@ -133,12 +118,6 @@ def test_outside_limits(client: TestClient) -> None:
     assert content["value"] == 3.5
     assert content["lower"] == pytest.approx(-3.14159265)
     assert content["upper"] == pytest.approx(3.14159265)
-
-
-def test_outside_the_limits_of_the_request(client: TestClient) -> None:
-    limits = {"position": {"upper": [1.0, 1.0, 1.5, 1.0, 1.0, 1.0]}}
-    content = refused(client.post("/optimize", json=move(limits=limits)), OutsideLimits)
-    assert (content["joint"], content["upper"]) == ("elbow_joint", 1.5)
 
 
 def test_duration_too_short(client: TestClient) -> None:
@@ -230,14 +209,3 @@ def test_internal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     answer = client.post("/ik", json={"pose": pose})
     refused(answer, InternalError)
     assert "caller-secret" not in answer.text
-
-
-@pytest.mark.parametrize("kind", types_of_error())
-def test_has_a_page(client: TestClient, kind: type[DeclaredError]) -> None:
-    page = client.get(path_of(kind))
-    assert page.status_code == 200
-    assert page.headers["content-type"].startswith("text/html")
-    assert kind.title in page.text
-    for field in own_fields(kind):
-        assert f"<code>{field}</code>" in page.text
-    assert "://" not in page.text

@@ -17,11 +17,10 @@ from joulepath import (
     DurationTooShort,
     InvalidRequest,
     InvalidTable,
-    UnknownRobot,
     UnreachableTargets,
 )
 from joulepath.app.exceptions.stored import KeyReused, UnknownAnswer, UnknownStudy
-from joulepath.app.schemas.studies import IterationDetail, Study, StudyList, StudySummary
+from joulepath.app.schemas.studies import IterationDetail, Study, StudySummary
 from joulepath.optimizer.exceptions import DeclaredError
 from tests.app.documents import open_document
 from tests.app.problems import checked
@@ -197,24 +196,6 @@ def test_deleted_with_all_that_belongs_to_it(recorded: TestClient) -> None:
     checked(UnknownAnswer, recorded.get(f"/answers/{step['answer']}").content)
 
 
-def test_pages_hold_every_study_once(recorded: TestClient) -> None:
-    made = [begin(recorded, name=f"Page {k}").rpartition("/")[2] for k in range(7)]
-    found: list[str] = []
-    after = None
-    while True:
-        answer = recorded.get("/studies", params={"limit": 3} | ({"after": after} if after else {}))
-        page = StudyList.model_validate_json(answer.content)
-        found += [study.id for study in page.studies]
-        after = page.next
-        if after is None:
-            break
-        assert len(page.studies) == 3
-    assert found[:7] == made[::-1]
-    assert len(found) == len(set(found))
-    created = [recorded.get(f"/studies/{id}").json()["created"] for id in found]
-    assert created == sorted(created, reverse=True)
-
-
 def test_a_repeated_request_makes_nothing_new(recorded: TestClient) -> None:
     key = {"Idempotency-Key": "begin-once"}
     body = {"name": "Once", "threshold": 50.0}
@@ -276,11 +257,6 @@ def test_a_malformed_study_is_refused(
     assert SECRET not in answer.text
 
 
-def test_an_unknown_robot_is_refused(recorded: TestClient) -> None:
-    answer = recorded.post("/studies", json={"name": "A study", "threshold": 50.0, "robot": "r2d2"})
-    checked(UnknownRobot, answer.content)
-
-
 @pytest.mark.parametrize(
     "body",
     [
@@ -306,28 +282,6 @@ def test_a_malformed_key_is_refused(recorded: TestClient, key: str) -> None:
     )
     (error,) = checked(InvalidRequest, answer.content).errors
     assert error.loc == ["header", "Idempotency-Key"]
-
-
-@pytest.mark.parametrize(
-    "query",
-    ["limit=0", "limit=201", "limit=x", "after=x", f"after=1_{'x' * 36}", f"a%20{SECRET}=1"],
-)
-def test_a_malformed_query_is_refused(recorded: TestClient, query: str) -> None:
-    answer = recorded.get(f"/studies?{query}")
-    assert checked(InvalidRequest, answer.content).errors
-    assert SECRET not in answer.text
-
-
-@pytest.mark.parametrize("id", ["none", ABSENT, "x" * 5000, "%00", "%ff", "ü"])
-def test_unknown_study(recorded: TestClient, id: str) -> None:
-    answers = [
-        recorded.get(f"/studies/{id}"),
-        recorded.delete(f"/studies/{id}"),
-        recorded.get(f"/studies/{id}/iterations/1"),
-    ]
-    for answer in [*answers, recorded.post(f"/studies/{id}/iterations", json=FREE)]:
-        assert answer.status_code == 404
-        checked(UnknownStudy, answer.content)
 
 
 @pytest.mark.parametrize(

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath import Arm, InvalidRequest, load_robot
+from joulepath import Arm, load_robot
 from joulepath.app.api.studies.suggest.models import Suggestions
 from joulepath.app.convert.pose import to_matrix
 from joulepath.app.exceptions.queue import ShuttingDown
-from joulepath.app.exceptions.stored import EmptyStudy, UnknownStudy
+from joulepath.app.exceptions.stored import EmptyStudy
 from joulepath.app.schemas.common import QuaternionPose
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import rotated_poses
 from tests.app.problems import checked
 from tests.app.recorded import recorded_service
 from tests.app.requests import HOME, NEAR, move
-from tests.app.routes.test_studies import ABSENT, SECRET, added, begin
+from tests.app.routes.test_studies import added, begin
 
 SAME = 1e-9
 """Relative: the optimiser computes the same from the same request; clocks only tell it when to
@@ -196,16 +196,3 @@ def test_an_empty_study_has_no_next_step(client: TestClient) -> None:
     answer = client.get(f"{begin(client)}/suggest")
     assert answer.status_code == 409
     checked(EmptyStudy, answer.content)
-
-
-@pytest.mark.parametrize(
-    "query", ["base=worst", "deadline=0", "deadline=nan", "deadline=599", f"a%20{SECRET}=1"]
-)
-def test_a_malformed_query_is_refused(client: TestClient, query: str) -> None:
-    answer = client.get(f"/studies/{ABSENT}/suggest?{query}")
-    assert checked(InvalidRequest, answer.content).errors
-    assert SECRET not in answer.text
-
-
-def test_unknown_study(client: TestClient) -> None:
-    checked(UnknownStudy, client.get(f"/studies/{ABSENT}/suggest").content)
