@@ -80,14 +80,6 @@ def test_a_closed_form_finds_the_configuration_in_any_drawing(
         assert found.away < FOUND and found.error < ACCURACY
 
 
-def test_a_redrawn_arm_moves_alike() -> None:
-    rng = np.random.default_rng(3)
-    axes = random_axes(TRIOS[0], rng)
-    other, senses, zeros = redrawn(axes, rng)
-    q = rng.uniform(-np.pi, np.pi, (8, 6))
-    assert np.abs(axes.chain().flange(q) - other.chain().flange(senses * q + zeros)).max() < 1e-12
-
-
 def test_nothing_found_does_not_claim_the_pose_out_of_reach() -> None:
     """An empty result near the full length of the arm is no proof of a pose out of reach."""
     rng = np.random.default_rng(5)

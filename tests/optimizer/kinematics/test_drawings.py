@@ -137,24 +137,6 @@ def test_every_configuration_of_a_calibrated_arm_is_found(robot: Robot, count: i
         assert inverse.label(q) == nominal.label(q)
 
 
-def test_rounded_angles_are_no_hindrance() -> None:
-    """Rounded angles do not prevent a solution.
-
-    With quarter turns written as 1.5708, no axes are parallel or meet.
-    """
-    model = KUKA.model.copy()
-    for j in range(1, 7):
-        M = model.jointPlacements[j]
-        model.jointPlacements[j] = pin.SE3(
-            pin.rpy.rpyToMatrix(np.round(pin.rpy.matrixToRpy(M.rotation), 4)), M.translation
-        )
-    arm, rng = replace(KUKA, model=model), np.random.default_rng(22)
-    assert isinstance(DecomposedArm.of(model), DecomposedArm)
-    for _ in range(20):
-        found = solved(arm, inside(arm, rng))
-        assert found.away < FOUND and found.error < ACCURACY and not found.twice
-
-
 @pytest.mark.parametrize("off", [0.0, 1e-4, 1e-3])
 def test_a_calibrated_wrist_has_no_self_motion_but_single_configurations(off: float) -> None:
     """A calibrated wrist has single configurations in place of a self-motion.

@@ -144,10 +144,6 @@ def test_tcp_is_what_reaches_the_pose() -> None:
         assert np.abs(forward(solution.q) @ T_flange_tcp - T_base_tcp).max() < ACCURACY
 
 
-def test_everyday_posture_has_the_everyday_label() -> None:
-    assert str(IK.label(EVERYDAY)) == "left/up/no_flip"
-
-
 def test_labels_say_where_the_elbow_and_the_arm_are() -> None:
     """Labels agree with the height of the elbow and the side of the offset, computed from frames.
 

@@ -25,7 +25,6 @@ from tests.optimizer.kinematics.flange import (
     IK,
     LIMITS,
     MODEL,
-    ROUNDING,
     forward,
     jacobian,
     joints,
@@ -61,12 +60,6 @@ def test_distance_is_to_the_nearest_reachable_position(T: Array) -> None:
     distance = caught.value.distance
     assert distance is not None
     assert distance == pytest.approx(nearest_by_search(T), abs=SEARCH)
-
-
-def test_distance_from_the_first_axis_is_the_shoulders_offset() -> None:
-    with pytest.raises(UnreachablePose) as caught:
-        IK.solve(pose([0.0, 0.0, 0.6], pin.rpy.rpyToMatrix(np.pi, 0.0, 0.3)))
-    assert caught.value.distance == pytest.approx(0.1333, abs=ROUNDING)
 
 
 def nearest_by_search(T: Array) -> float:

@@ -66,7 +66,7 @@ def test_every_configuration_is_found_once(count: int) -> None:
     assert IK.complete
 
 
-@pytest.mark.parametrize("off", [1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 1.0])
+@pytest.mark.parametrize("off", [3e-5, 3e-4, 1.0])
 def test_regular_poses_have_the_same_solutions_by_the_general_method(
     off: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

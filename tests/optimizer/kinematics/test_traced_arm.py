@@ -12,7 +12,6 @@ from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.chain import Chain, pose_error, twist_size
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.seven.curve_tracing import cycles, trace
-from joulepath.optimizer.kinematics.seven.hermite import hermite_weights
 from joulepath.optimizer.kinematics.seven.nearby_arm import NearbyArm
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
 from joulepath.optimizer.kinematics.seven.seed_table import SeedTable
@@ -170,16 +169,6 @@ def test_the_parameter_of_a_member_is_found_again(robot: Robot, arm: TracedArm) 
         for u in rng.uniform(*curve.arcs[0], 4):
             found = curve.at(np.array([u, curve.parameter(curve.at(np.array([u]))[0])]))
             assert np.abs(wrapped(found[1] - found[0])).max() < LIMIT
-
-
-def test_points_at_many_shares_are_those_at_each(robot: Robot, arm: TracedArm) -> None:
-    curve = arm.self_motions(flange(robot, inside(robot, np.random.default_rng(76))))[0]
-    share, joints, k = np.linspace(0.0, 1.0, 5), np.array([1, 4]), np.arange(3)
-    each = curve.stack.at_each(k, hermite_weights(share), joints)
-    for row in k:
-        assert (
-            np.abs(each[row] - curve.stack.at(np.full(5, row), share)[:, joints]).max() < ROUNDING
-        )
 
 
 def test_boxes_hold_the_curve(robot: Robot, arm: TracedArm) -> None:
