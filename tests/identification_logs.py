@@ -299,11 +299,11 @@ def csv_of(
         power = recording.power[:, None]
         header += ["P"] if form == "own" else ["actual_robot_voltage", "actual_robot_current"]
         columns += [power] if form == "own" else [np.full_like(power, 48.0), power / 48.0]
-    lines = [separator.join(header)]
-    for row in np.hstack(columns).tolist():
-        cells = [f"{row[0]:.12g}", *(f"{value:.9g}" for value in row[1:])]
-        lines.append(separator.join(cells).replace(".", decimal))
-    return "\n".join(lines).encode() + b"\n"
+    line = separator.join(["%.12g", *["%.9g"] * (len(header) - 1)])
+    lines = [line % tuple(row) for row in np.hstack(columns).tolist()]
+    if decimal != ".":
+        lines = [each.replace(".", decimal) for each in lines]
+    return "\n".join([separator.join(header), *lines]).encode() + b"\n"
 
 
 def with_current(recording: Recording, current: Array) -> Recording:

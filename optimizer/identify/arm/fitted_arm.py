@@ -19,6 +19,7 @@ from joulepath.optimizer.identify.arm.power_model import (
     TorqueParts,
     bus_power,
     friction_torque,
+    motor_torque,
     power_of_torque,
 )
 from joulepath.optimizer.identify.estimates.estimate import Name
@@ -167,7 +168,15 @@ class FittedArm:
 
     def energy(self, rows: Rows) -> float:
         """Energy [J] of the rows on the bus."""
-        return float(rows.weight @ self.power(rows)[0])
+        parts = self.torque_parts(rows)
+        power = power_of_torque(
+            self.power_parameters,
+            parts.v,
+            motor_torque(self.power_parameters, parts),
+            self.torque_constant,
+            self.regeneration,
+        )
+        return float(rows.weight @ power)
 
 
 def own_arm(robot: Robot, knee: float | None = None) -> FittedArm:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -26,6 +28,8 @@ class FilterSettings:
     """Smallest ratio of rate to cut-off frequency [1]."""
     order: int = 2
     """Order of the Butterworth filter, applied forwards and backwards."""
+    most_values: int = 1 << 18
+    """Largest number of values that are filtered at once; the filter copies them several times."""
 
 
 FILTERS = FilterSettings()
@@ -39,19 +43,33 @@ def cutoff(rate: float) -> float:
 def low_passed(values: Array, rate: float) -> Array:
     """Channels (n, k) without frequencies above the cut-off and without delay."""
     smooth = np.empty_like(values)
-    # one channel at a time: the filter copies its input
-    for k, channel in enumerate(values.T):
-        smooth[:, k] = filtered(channel, rate, cutoff(rate))
+    for part in _parts(values):
+        smooth[:, part] = filtered(values[:, part], rate, cutoff(rate))
     return smooth
 
 
-def filtered(channel: Array, rate: float, max_frequency: float) -> Array:
-    """A channel (n,) without frequencies above a limit [Hz]: a Butterworth filter, both ways."""
-    # imported late: only logs are filtered, and every serving process would hold 25 MB of it
-    from scipy.signal import butter, sosfiltfilt
+def _parts(values: Array) -> Iterator[slice]:
+    """Channels of (n, k) that are filtered at once; at least one."""
+    most = max(FILTERS.most_values // max(len(values), 1), 1)
+    return (slice(k, k + most) for k in range(0, values.shape[1], most))
 
-    sections = butter(FILTERS.order, max_frequency, fs=rate, output="sos")
-    return np.asarray(sosfiltfilt(sections, channel))
+
+def filtered(values: Array, rate: float, max_frequency: float) -> Array:
+    """Channels (n,) or (n, k) without frequencies above a limit [Hz]: a Butterworth filter, both
+    ways.
+    """
+    # imported late: only logs are filtered, and every serving process would hold 25 MB of it
+    from scipy.signal import sosfiltfilt
+
+    return np.asarray(sosfiltfilt(_sections(rate, max_frequency), values, axis=0))
+
+
+@lru_cache
+def _sections(rate: float, max_frequency: float) -> Array:
+    """Second-order sections of the filter; to design them takes as long as to filter a log."""
+    from scipy.signal import butter
+
+    return np.asarray(butter(FILTERS.order, max_frequency, fs=rate, output="sos"))
 
 
 def derivative(values: Array, rate: float) -> Array:
@@ -85,10 +103,10 @@ def _clean_cutoff(channel: Array, rate: float) -> float:
 
 def noise(values: Array, rate: float) -> Array:
     """Robust standard deviation (k,) of the part of channels (n, k) above the cut-off frequency."""
-    return np.array([_noise(channel, rate) for channel in values.T])
+    return np.concatenate([_noise(values[:, part], rate) for part in _parts(values)])
 
 
-def _noise(channel: Array, rate: float) -> float:
-    above = channel - low_passed(channel[:, None], rate)[:, 0]
-    above -= np.median(above)
-    return float(MAD_TO_SD * np.median(np.abs(above)))
+def _noise(values: Array, rate: float) -> Array:
+    above = values - low_passed(values, rate)
+    above -= np.median(above, axis=0)
+    return np.asarray(MAD_TO_SD * np.median(np.abs(above), axis=0))

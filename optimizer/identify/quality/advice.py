@@ -110,13 +110,24 @@ def _figures(nq: int, size: int) -> Iterator[tuple[str, int | None, IntArray]]:
 
 def _explained(covariance: Array, gradient: Array, at: IntArray) -> float:
     """Reduction of the variance [J²] by exact knowledge of the figures at the indices `at` (k,)."""
-    return float(gradient @ _determined(covariance, at) @ gradient)
+    shared, inverse = _shared(covariance, at)
+    by_figures = gradient @ shared
+    return float(by_figures @ inverse @ by_figures)
 
 
 def _determined(covariance: Array, at: IntArray) -> Array:
     """Reduction of the covariance (p, p) by exact knowledge of the figures at `at` (k,)."""
-    sd = np.sqrt(np.maximum(np.diag(covariance)[at], 0.0))
+    shared, inverse = _shared(covariance, at)
+    return np.asarray(shared @ inverse @ shared.T)
+
+
+def _shared(covariance: Array, at: IntArray) -> tuple[Array, Array]:
+    """Covariance (p, k) of all figures with those at `at` of unit variance, and the inverse (k, k)
+    of the correlation of the latter; figures without a variance are left out.
+    """
+    sd = np.sqrt(np.maximum(covariance[at, at], 0.0))
     at, sd = at[sd > 0], sd[sd > 0]
+    if len(at) == 1:
+        return covariance[:, at] / sd, np.ones((1, 1))
     correlation = covariance[np.ix_(at, at)] / np.outer(sd, sd)
-    shared = covariance[:, at] / sd
-    return np.asarray(shared @ np.linalg.pinv(correlation, hermitian=True) @ shared.T)
+    return covariance[:, at] / sd, np.linalg.pinv(correlation, hermitian=True)
