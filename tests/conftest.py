@@ -136,14 +136,15 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
 
     from joulepath.app.main import create_app
     from joulepath.app.settings import Settings
+    from tests.app.documents import open_document
     from tests.app.live import COMPUTED, GRACE, LOCAL, WARM_UP
     from tests.app.shared import migrated
 
     database = migrated(tmp_path_factory.mktemp("service"))
     settings = Settings(workers=2, queue_size=4, deadline_grace=GRACE, database_url=database)
-    with TestClient(
-        create_app(settings), base_url=LOCAL, raise_server_exceptions=False, headers=COMPUTED
-    ) as client:
+    app = create_app(settings)
+    app.openapi_schema = open_document()  # to build it takes a second
+    with TestClient(app, base_url=LOCAL, raise_server_exceptions=False, headers=COMPUTED) as client:
         end = time.monotonic() + WARM_UP
         while client.get("/readyz").status_code != 200:
             assert time.monotonic() < end, "the workers do not warm up"

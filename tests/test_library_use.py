@@ -228,11 +228,11 @@ def test_the_stub_lists_each_name_once() -> None:
     assert len(set(imported)) == len(imported)
 
 
-@pytest.mark.parametrize("name", sorted(FUNCTIONS | ERRORS | TYPES | SERVICE))
-def test_every_name_is_documented(name: str) -> None:
+def test_every_name_is_documented() -> None:
     """A dataclass without a docstring has its signature for one, which does not count."""
-    text = getattr(joulepath, name).__doc__
-    assert text and not text.startswith(f"{name}(")
+    for name in joulepath.__all__:
+        text = getattr(joulepath, name).__doc__
+        assert text and not text.startswith(f"{name}("), name
 
 
 @pytest.mark.parametrize("name", sorted(FUNCTIONS))

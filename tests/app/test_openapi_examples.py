@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import jsonschema_rs
@@ -52,7 +53,13 @@ class Operation:
         documented = self.content["responses"][str(answer.status_code)]
         if answer.status_code != 204 and answer.headers.get("content-type") == "application/json":
             schema = documented["content"]["application/json"]["schema"]
-            jsonschema_rs.validate(schema | {"components": DOCUMENT["components"]}, answer.json())
+            validator_of(json.dumps(schema)).validate(answer.json())
+
+
+@cache
+def validator_of(schema: str) -> jsonschema_rs.Validator:
+    """The validator of a schema of the document."""
+    return jsonschema_rs.validator_for(json.loads(schema) | {"components": DOCUMENT["components"]})
 
 
 def example_of(parameter: dict[str, Any]) -> Any:

@@ -180,17 +180,22 @@ def mesh(kind: Any, content: bytes) -> Any:
     return mesh_from_file(kind, base64.b64encode(content).decode(), 1.0)
 
 
-GROUPS = CORNERS + b"".join(b"g a%d\nusemtl m%d\nf 1 2 3\n" % (k, k) for k in range(40_000))
-SOLIDS = b"solid\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendsolid\n" * 40_000
+def groups() -> bytes:
+    faces = (b"g a%d\nusemtl m%d\nf 1 2 3\n" % (k, k) for k in range(40_000))
+    return CORNERS + b"".join(faces)
 
 
-@pytest.mark.parametrize(("kind", "content"), [("obj", GROUPS), ("stl", SOLIDS)])
-def test_groups_materials_and_solids_cost_nothing(kind: Any, content: bytes) -> None:
+def solids() -> bytes:
+    return b"solid\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendsolid\n" * 40_000
+
+
+@pytest.mark.parametrize(("kind", "content"), [("obj", groups), ("stl", solids)])
+def test_groups_materials_and_solids_cost_nothing(kind: Any, content: Callable[[], bytes]) -> None:
     """The mesh has the triangles of all groups.
 
     The time once grew as the square of their number, to minutes for these files.
     """
-    assert len(mesh(kind, content).corners) == 40_000
+    assert len(mesh(kind, content()).corners) == 40_000
 
 
 @pytest.mark.parametrize(
@@ -328,24 +333,25 @@ def test_gzip_that_yields_nothing_ends_at_the_deadline(content: bytes) -> None:
 @pytest.mark.parametrize(
     "change",
     [
-        {"urdf": "<robot>" + "<!--" * 500_000},
-        {
-            "urdf": URDF.replace(
-                "<robot", "<robot " + " ".join(f'a{k}="1"' for k in range(100_000)), 1
-            )
+        lambda: {"urdf": "<robot>" + "<!--" * 500_000},
+        lambda: {"urdf": DOCUMENTS["attributes"][0](100_000)},
+        lambda: {"urdf": DOCUMENTS["levels"][0](400_000)},
+        lambda: {"urdf": URDF.replace(SHAPE, '<cylinder radius="-0.2" length="0.3"/>')},
+        lambda: {
+            "urdf": meshed('scale="1e-9 1e-9 1e-9"'),
+            "meshes": zipped({"link.obj": obj(BLOCK)}),
         },
-        {"urdf": URDF.replace("</robot>", "<a>" * 400_000 + "</a>" * 400_000 + "</robot>")},
-        {"urdf": URDF.replace(SHAPE, '<cylinder radius="-0.2" length="0.3"/>')},
-        {"urdf": meshed('scale="1e-9 1e-9 1e-9"'), "meshes": zipped({"link.obj": obj(BLOCK)})},
-        {"urdf": meshed(""), "meshes": zipped({"link.obj": GROUPS})},
-        {"meshes": zipped({"a.stl": b"\0" * (LIMITS.mesh_bytes + 1)})},
+        lambda: {"urdf": meshed(""), "meshes": zipped({"link.obj": groups()})},
+        lambda: {"meshes": zipped({"a.stl": b"\0" * (LIMITS.mesh_bytes + 1)})},
     ],
 )
-def test_the_worker_answers_and_lives_on(client: TestClient, change: dict[str, Any]) -> None:
+def test_the_worker_answers_and_lives_on(
+    client: TestClient, change: Callable[[], dict[str, Any]]
+) -> None:
     """The last mesh but one has three corners only, in 40,000 groups."""
     workers = sorted(client.app.state.engine.worker_pids)  # type: ignore[attr-defined]
     errors = refused(
-        client.post("/robots", json={"name": "attack", **ARM, **change}), InvalidRequest
+        client.post("/robots", json={"name": "attack", **ARM, **change()}), InvalidRequest
     )["errors"]
     assert errors[0]["loc"] in (["body", "urdf"], ["body", "meshes"])
     assert sorted(client.app.state.engine.worker_pids) == workers  # type: ignore[attr-defined]

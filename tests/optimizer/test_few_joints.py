@@ -137,7 +137,7 @@ def test_a_position_within_the_length_that_is_not_reached(arm: Arm) -> None:
 @pytest.mark.parametrize(
     ("kind", "count"),
     long_but(
-        [("free", 1), ("about", 2), ("free", 3), ("about", 4), ("free", 5)],
+        [("free", 1), ("about", 3), ("free", 5)],
         product(("free", "about"), range(1, 6)),
     ),
 )

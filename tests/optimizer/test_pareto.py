@@ -270,7 +270,7 @@ def test_a_front_whose_deadline_ended_a_search_is_not_optimal() -> None:
         objective="mechanical",
         duration_max=9.0,
     )
-    for readings in range(130, 180, 5):
+    for readings in range(130, 180, 10):
         with suppress(DeadlineExceeded):
             assert (
                 pareto(replace(asked, deadline=float(readings)), 100, CountingClock()).status

@@ -244,8 +244,9 @@ def test_damaged_bodies_are_told_so(server: Server, coding: str, body: bytes) ->
 PACKS: dict[str, Any] = {"gzip": gzip.compress, "zstd": zstandard.compress}
 
 
-@pytest.mark.parametrize("coding", PACKS)
-@pytest.mark.parametrize("path", ["/ik", "/evaluate", "/whatif"])
+@pytest.mark.parametrize(
+    ("path", "coding"), [("/ik", "gzip"), ("/evaluate", "zstd"), ("/whatif", "gzip")]
+)
 def test_a_bomb_is_refused(server: Server, path: str, coding: str) -> None:
     # at most a hundred kilobytes, unpacked to more than the limit of any path
     bomb = PACKS[coding](b" " * 80_000_000)

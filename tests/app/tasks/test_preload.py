@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
+import os
 
-ROOT = Path(__file__).parents[3]
+from tests.app.forks import ROOT, run
+from tests.app.live import WARM_UP
 
 
 def test_the_tasks_of_all_endpoints_are_imported() -> None:
-    code = "import sys, joulepath.app.tasks.preload; print(*sys.modules)"
-    told = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    code = (
+        "import sys\n"
+        "for name in [*sys.modules]:\n"
+        "    if name.startswith('joulepath.app.api'): del sys.modules[name]\n"
+        "import joulepath.app.tasks.preload; print(*sys.modules)"
     )
+    told = run(("-c", code), os.environ, WARM_UP)
+    assert told.returncode == 0, told.stderr
     api = ROOT / "app" / "api"
     tasks = {
         ".".join(("joulepath", "app", "api", *file.relative_to(api).with_suffix("").parts))
         for file in api.rglob("task.py")
     }
-    assert tasks and tasks <= set(told.stdout.split())
+    assert tasks and tasks <= set(told.stdout.decode().split())

@@ -45,7 +45,11 @@ class Move:
     @property
     def energy(self) -> float:
         """Energy of the move [J]."""
-        return self.swing / self.duration**2 + self.drawn * self.duration - self.gained
+        return float(self.energy_in(np.float64(self.duration)))
+
+    def energy_in(self, duration: Array) -> Array:
+        """Energies [J] of the move in other durations [s]."""
+        return self.swing / duration**2 + self.drawn * duration - self.gained
 
     def __call__(self, price: float) -> Move:
         """The move in the duration of least energy + price · duration."""
@@ -72,16 +76,16 @@ def least(moves: list[Move], time: float, waiting: float) -> float:
     n = len(moves)
     rows, limits = [], []
     for k, move in enumerate(moves):
-        for length in np.geomspace(move.shortest, move.longest, 600).tolist():
-            slope = move.drawn - 2 * move.swing / length**3
-            row = np.zeros(2 * n + 1)
-            row[[k, n + k]] = slope, -1
-            rows.append(row)
-            limits.append(slope * length - replace(move, duration=length).energy)
+        length = np.geomspace(move.shortest, move.longest, 600)
+        slope = move.drawn - 2 * move.swing / length**3
+        tangents = np.zeros((len(length), 2 * n + 1))
+        tangents[:, k], tangents[:, n + k] = slope, -1
+        rows.append(tangents)
+        limits.append(slope * length - move.energy_in(length))
     total = np.concatenate([np.ones(n), np.zeros(n), [1.0]])[None]
     ends = [(move.shortest, move.longest) for move in moves] + [(None, None)] * n + [(0, None)]
     costs = np.concatenate([np.zeros(n), np.ones(n), [waiting]])
-    return float(linprog(costs, np.array(rows), limits, total, [time], ends).fun)
+    return float(linprog(costs, np.vstack(rows), np.hstack(limits), total, [time], ends).fun)
 
 
 def fastest(moves: list[Move]) -> list[Move]:

@@ -25,8 +25,10 @@ ROUNDING = 1e-9
 # relative; a sampling of 1 ms misses the peak at a reversal by the slope of the torque times half a
 # millisecond
 MISSED = 1e-3
-# s; dense samples: at 10 rad/s², friction's step (1e-3 rad/s) spans a hundred samples
-DENSE = 1e-6
+# s; coarse samples, and dense ones next to the largest of them: at 10 rad/s², friction's step
+# (1e-3 rad/s) spans ten coarse samples
+COARSE = 1e-5
+DENSE = 1e-7
 
 
 def motion(arm: Arm, seed: int) -> Spline:
@@ -43,6 +45,14 @@ def sizes(prepared: PreparedProblem, spline: Spline, t: Array) -> Array:
     """Absolute limited torques (k, nq) [N·m] at times t (k,) [s]."""
     q, v, a = sample(spline, t)
     return np.abs(limited_torque(prepared.arm, prepared.torques(q, v, a), v, a))
+
+
+def densely(prepared: PreparedProblem, spline: Spline) -> Array:
+    """Largest absolute limited torques (nq,) [N·m] of a dense sampling."""
+    t = np.arange(0.0, spline.duration, COARSE)
+    peaks = t[sizes(prepared, spline, t).argmax(axis=0)]
+    near = peaks[:, None] + np.arange(-COARSE, COARSE, DENSE)
+    return sizes(prepared, spline, np.clip(near.ravel(), 0.0, spline.duration)).max(axis=0)
 
 
 def bounds(prepared: PreparedProblem, spline: Spline) -> Array:
@@ -66,7 +76,7 @@ def test_no_torque_between_samples_is_above_the_bound(robot: str, side: str) -> 
     for seed in range(2):
         spline = motion(prepared.arm, seed)
         limit = prepared.arm.active_limits.tau_max
-        dense = sizes(prepared, spline, np.arange(0.0, spline.duration, DENSE)).max(axis=0)
+        dense = densely(prepared, spline)
         bound, joint = bounds(prepared, spline), int(np.argmax(dense / limit))
         assert (bound >= dense).all()
         assert bound[joint] <= dense[joint] * (1 + SHARP)

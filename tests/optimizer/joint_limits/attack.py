@@ -14,9 +14,9 @@ from joulepath.optimizer.joint_limits.torque_load import Rates
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.problem.arm import Arm, Payload
 
-STARTS = 200
+STARTS = 100
 """Random postures of an attack."""
-STEPS = 60
+STEPS = 40
 """Random steps from the worst posture of each joint, ever smaller, uphill only."""
 
 
