@@ -53,7 +53,8 @@ class Problem:
         method: method of the solver; ignored with a tool path or passes.
         objective: "electrical" energy or "mechanical" work.
         duration_min: least duration [s]; None for no limit.
-        duration_max: greatest duration [s]; None for no limit. Equal bounds fix the duration.
+        duration_max: greatest duration [s]; None for no limit but the 600 s of any motion. Equal
+            bounds fix the duration.
         dwell: rest at the goal; the motion is then no longer than `dwell.time`.
         tool_path: path of the TCP from start to goal, a pose or joint positions. Only branch and
             timing are free; if the tool may turn about an axis, start and goal may be a
@@ -97,7 +98,8 @@ class Problem:
             )
             object.__setattr__(self, name, end)
         for name in ("duration_min", "duration_max"):
-            check_number("duration", getattr(self, name), "seconds", positive=True, optional=True)
+            value, most = getattr(self, name), DURATIONS.longest
+            check_number("duration", value, "seconds", most=most, positive=True, optional=True)
         if (
             self.duration_min is not None
             and self.duration_max is not None
@@ -126,12 +128,8 @@ class Problem:
                 raise InvalidProblem(
                     "duration", "The shortest duration must not exceed dwell.time."
                 )
-            longest = (
-                self.dwell.time
-                if self.duration_max is None
-                else min(self.duration_max, self.dwell.time)
-            )
-            object.__setattr__(self, "duration_max", longest)
+            longest = DURATIONS.longest if self.duration_max is None else self.duration_max
+            object.__setattr__(self, "duration_max", min(longest, self.dwell.time))
         if self.objective == "mechanical" and self.duration_max is None:
             raise InvalidProblem(
                 "duration",

@@ -73,6 +73,7 @@ def test_defaults() -> None:
         ({"duration_max": -1.0}, "duration"),
         ({"duration_max": math.nan}, "duration"),
         ({"duration_max": math.inf}, "duration"),
+        ({"duration_max": 601.0}, "duration"),
         ({"duration_min": 2.0, "duration_max": 1.0}, "duration"),
         ({"objective": "mechanical"}, "duration"),
         ({"objective": "mechanical", "duration_min": 1.0}, "duration"),
