@@ -18,13 +18,23 @@ LONG = 40.0
 """Duration [s] of which the swing to the goal takes a tenth."""
 GAP = 0.05
 """Largest relative gap to the lower bound. A solve over the whole time alone has a gap of 1."""
+DEADLINE = 100.0
+"""Deadline [s] that no search reaches, not even on a busy machine."""
 ROUNDING = 1e-14
 """Rounding error of joint positions at rest [rad]."""
 
 
 def problem(**given: Any) -> Problem:
     arm = Arm(robot=ROBOT, collisions=False)
-    return Problem(arm=arm, start=START, goal=GOAL, objective="mechanical", windings=False, **given)
+    return Problem(
+        arm=arm,
+        start=START,
+        goal=GOAL,
+        objective="mechanical",
+        windings=False,
+        deadline=DEADLINE,
+        **given,
+    )
 
 
 @pytest.mark.parametrize("least", long_but([LONG], [None, LONG, 30.0]))
