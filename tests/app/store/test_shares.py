@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sqlalchemy import func, select, text
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from joulepath.app.exceptions.queue import TooManyWaiting, TooManyWaitingOfClient
@@ -19,7 +19,7 @@ from joulepath.app.store.shares import stored_key
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import Answer, OwnRobot, StoredLog, Study, new_id, now
 from tests.app.databases import on_both_databases
-from tests.app.store.test_store import A_DAY, migrate_to, put
+from tests.app.store.test_store import A_DAY, insert_rows, migrate_to, put
 
 
 async def queue(
@@ -114,10 +114,7 @@ def test_keys_of_an_earlier_version_become_those_of_their_clients(url: str) -> N
         study | {"id": "a", "created": now(), "owner": "press", "idempotency_key": "night"},
         study | {"id": "b", "created": now(), "owner": None, "idempotency_key": "open"},
     ]
-    columns = ", ".join(rows[0]), ", ".join(f":{each}" for each in rows[0])
-    with engine.execution_options(writes=True).begin() as connection:
-        insert = text(f"INSERT INTO studies ({columns[0]}) VALUES ({columns[1]})")
-        connection.execute(insert, rows)
+    insert_rows(engine, "studies", rows)
     migrate(engine)
     with engine.connect() as connection:
         found = connection.execute(select(Study.idempotency_key).order_by(Study.id)).scalars().all()

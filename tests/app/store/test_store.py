@@ -19,11 +19,12 @@ from typing import Any
 
 import httpx2
 import pytest
+import sqlalchemy
 from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
-from sqlalchemy import Engine, func, inspect, select, text, update
+from sqlalchemy import Engine, MetaData, func, insert, inspect, select, text, update
 from sqlalchemy.exc import DBAPIError
 from starlette.testclient import TestClient
 
@@ -97,6 +98,13 @@ def migrate_to(engine: Engine, revision: str) -> None:
         command.upgrade(config, revision)
 
 
+def insert_rows(engine: Engine, table: str, rows: list[dict[str, Any]]) -> None:
+    """Inserts rows into a table of an earlier version, whose columns no class declares."""
+    with engine.execution_options(writes=True).begin() as connection:
+        found = sqlalchemy.Table(table, MetaData(), autoload_with=connection)
+        connection.execute(insert(found), rows)
+
+
 def test_requests_of_an_earlier_version_get_the_owner_of_their_job(url: str) -> None:
     engine = create_database_engine(url)
     migrate_to(engine, "initial")
@@ -104,12 +112,8 @@ def test_requests_of_an_earlier_version_get_the_owner_of_their_job(url: str) -> 
     job |= {"id": "j", "owner": "cell 7", "created": now(), "fingerprint": "f"}
     request = {"job_id": "j", "number": 0, "kind": "optimize", "deadline": 10.0, "body": b"{}"}
     request |= {"state": "waiting", "attempt": 0, "deaths": 0, "preempted": 0}
-    with engine.execution_options(writes=True).begin() as connection:
-        for name, row in (("jobs", job), ("job_requests", request)):
-            columns = ", ".join(row), ", ".join(f":{each}" for each in row)
-            connection.execute(
-                text(f"INSERT INTO {name} ({columns[0]}) VALUES ({columns[1]})"), row
-            )
+    insert_rows(engine, "jobs", [job])
+    insert_rows(engine, "job_requests", [request])
     migrate(engine)
     assert tables(url) == []
     with engine.connect() as connection:
