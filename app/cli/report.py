@@ -58,7 +58,10 @@ Examples:
     required=True,
     help="File to write. Its ending chooses the format: .html or .pdf.",
 )
-@click.option("--answer", help="Id of the kept answer to the request. Default: it is answered.")
+@click.option(
+    "--answer",
+    help="Id of the stored answer to the request. Default: the request is answered first.",
+)
 @click.option("--title", help="Title of the report.")
 @click.option("--robot", help="With a log: name of its robot. Default: ur5e.")
 @click.option(
@@ -67,14 +70,22 @@ Examples:
     help="With a log: JSON file with the query parameters of POST /logs: units, payload, columns, "
     "...",
 )
-@click.option("--period", type=float, help="Time from one start to the next [s]: the wait counts.")
-@click.option("--no-advice", is_flag=True, help="Do not compute changes that would need less.")
-@click.option("--cycles-per-shift", type=_Sourced(), help="Default: back to back for 8 hours.")
+@click.option(
+    "--period", type=float, help="Time from one start to the next [s]; the wait is included."
+)
+@click.option("--no-advice", is_flag=True, help="Do not compute changes that save energy.")
+@click.option(
+    "--cycles-per-shift", type=_Sourced(), help="Default: one directly after another for 8 hours."
+)
 @click.option("--shifts-per-year", type=_Sourced(), help="Default: no figures per year.")
-@click.option("--price", type=_Sourced(), help="Of a kilowatt-hour. Default: no money.")
+@click.option(
+    "--price", type=_Sourced(), help="Price of a kilowatt-hour. Default: no costs in money."
+)
 @click.option("--currency", help="Of the price. Default: €.")
 @click.option("--carbon", type=_Sourced(), help="kg CO2e per kilowatt-hour. Default: no CO2e.")
-@click.option("--control-box", type=_Sourced(), help="Its power [W]. Default: it is not counted.")
+@click.option(
+    "--control-box", type=_Sourced(), help="Power of the control box [W]. Default: not included."
+)
 def report(
     file: str,
     output: Path,
@@ -86,8 +97,8 @@ def report(
     no_advice: bool,
     **costs: Any,
 ) -> None:
-    """Writes one page on a motion, a cycle or a placement: energy, savings, costs, and what they
-    rest on.
+    """Writes one page on a motion, a cycle or a placement: energy, savings, costs, and their
+    assumptions.
 
     FILE is the JSON of `POST /optimize`, of `POST /cycle`, of `POST /placement`, or of `POST
     /evaluate` with a `log`; a log as CSV, plain or packed with gzip; `{"job": ID}` with a job of
@@ -149,12 +160,12 @@ Example:
   joulepath check report.pdf"""
 )
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--no-answer", is_flag=True, help="Do not answer the request anew.")
+@click.option("--no-answer", is_flag=True, help="Do not answer the request again.")
 def check(file: Path, no_answer: bool) -> int:
-    """Takes request and answer out of a report and computes both again.
+    """Extracts the request and the answer of a report, and computes them again.
 
     Every motion is certified again, its energy computed from the motion alone, and the request
-    answered anew. The exit code is 1 unless everything agrees.
+    answered again. The exit code is 1 unless everything agrees.
     """
     from joulepath.app.api.report.bundle import NoReport
     from joulepath.app.api.report.check import CheckTask
@@ -167,7 +178,7 @@ def check(file: Path, no_answer: bool) -> int:
             )
     except NoReport:
         raise click.UsageError(
-            f"{file} is no report of joulepath, or nothing is attached."
+            f"{file} is not a report of joulepath, or has no attached documents."
         ) from None
     lines = orjson.loads(result.document)
     rows = [

@@ -16,28 +16,28 @@ YOURS = "Y"
 ASSUMED = "E"
 NOT_COUNTED = "–"
 _LETTERS = {
-    "A": "the maker's files",
+    "A": "manufacturer",
     "B": "fitted to measured data",
-    "C": "second-hand",
-    "T": "from a sister robot",
-    "E": "default, no source",
+    "C": "second-hand source",
+    "T": "sister robot",
+    "E": "engineering default",
 }
 _SOURCES = {
-    "cycles_per_shift": "{} a shift",
-    "shifts_per_year": "{} shifts a year",
-    "price": "{} {currency} a kWh",
-    "carbon": "{} kg CO2e a kWh",
+    "cycles_per_shift": "{} repetitions per shift",
+    "shifts_per_year": "{} shifts per year",
+    "price": "{} {currency} per kWh",
+    "carbon": "{} kg CO2e per kWh",
     "control_box": "Control box, {} W",
 }
 _WORDS = {
-    "idle_power": "the electronics",
-    "friction": "the friction",
-    "copper": "the copper loss",
-    "load": "the friction under load",
-    "session": "the friction from day to day",
-    "move": "what the model cannot express",
-    "torque_constant": "the torque constants",
-    "rotor_inertia": "the rotors",
+    "idle_power": "idle power",
+    "friction": "friction",
+    "copper": "copper loss",
+    "load": "load-dependent friction",
+    "session": "day-to-day changes of friction",
+    "move": "effects outside the model",
+    "torque_constant": "torque constants",
+    "rotor_inertia": "rotor inertias",
 }
 _LARGE = 0.9
 _MOST_MASSES = 5
@@ -68,7 +68,7 @@ def assumptions(
 def _of_robot(request: Json, robot: Robot) -> Iterator[Assumption]:
     identified = request.get("figures") is not None
     for letter, names in figures_by_letter(robot.figures).items():
-        source = "your own arm" if letter == "B" and identified else _LETTERS[letter]
+        source = "identified on your arm" if letter == "B" and identified else _LETTERS[letter]
         yield Assumption(letter, _sentence(names), source)
 
 
@@ -90,15 +90,15 @@ def _of_request(request: Json, masses: Sequence[float], payload_from: str) -> It
 
 def _of_costs(costs: Json, period: float | None) -> Iterator[Assumption]:
     if costs.get("cycles_per_shift") is None:
-        often = "Back to back" if period is None else f"One every {period:g} s"
-        yield Assumption(ASSUMED, f"{often}, for 8 h a shift", "assumed")
+        often = "No pause" if period is None else f"One every {period:g} s"
+        yield Assumption(ASSUMED, f"{often} in a shift of 8 h", "assumed")
     for name, words in _SOURCES.items():
         given = costs.get(name)
         if given is not None:
             text = words.format(f"{given['value']:g}", currency=costs.get("currency") or "€")
             yield Assumption(given.get("letter") or YOURS, text, given["source"])
     if costs.get("control_box") is None:
-        yield Assumption(NOT_COUNTED, "Control box, mains loss", "not counted: no reading")
+        yield Assumption(NOT_COUNTED, "Control box and mains losses", "not included")
 
 
 def _sentence(names: list[str]) -> str:
@@ -118,6 +118,6 @@ def interval_note(interval: dict[str, Any] | None) -> str:
             break
     words = listed(names)
     return (
-        f"{words[:1].upper()}{words[1:]} make {made:.0%} of the interval. ".replace("%", " %")
-        + "A log of this arm replaces them."
+        f"{words[:1].upper()}{words[1:]} cause {100 * made:.0f} % of the width of the 90 % "
+        "interval. Figures identified from logs of this arm would replace them."
     )

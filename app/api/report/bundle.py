@@ -21,7 +21,6 @@ MARK = "joulepath_report"
 """Field identifying the document."""
 LARGEST_BUNDLE = 1 << 28
 """Largest unpacked document [byte]."""
-COMPUTED = "Computed, not measured. Never run on hardware by us."
 _SCRIPT = re.compile(rb'<script type="application/json" id="%s">([^<]*)</script>' % MARK.encode())
 _STREAM = re.compile(rb"stream\r?\n")
 
@@ -80,16 +79,20 @@ class Bundle:
     def how_to_check(self, id: str | None) -> str:
         """How to check the report, with the id of its answer."""
         again = {
-            "job": "certifies every motion again and answers every request anew",
-            "evaluate": "reads the log again and computes its motion anew",
-            "placement": "certifies every motion at both places again and computes their cycles "
-            "anew",
-        }.get(self.kind, "certifies every motion again and answers the request anew")
-        own = f" Answer {id}." if id else ""
+            "job": "certifies every motion and answers every request again",
+            "evaluate": "reads and evaluates the log again",
+            "placement": "certifies every motion and computes the cycles at both places again",
+        }.get(self.kind, "certifies every motion and answers the request again")
+        own = f" Id of the answer: {id}." if id else ""
         return (
-            "Request and answer are attached to this file. `joulepath check FILE` takes them out, "
-            f"{again}.{own}"
+            "The request and the answer are attached to this file. `joulepath check FILE` "
+            f"extracts them, {again}, and compares the energies.{own}"
         )
+
+    @property
+    def foot(self) -> str:
+        """The footer of a report of computed motions."""
+        return f"Computed by joulepath {self.version}, not measured on hardware."
 
 
 class NoReport(Exception):

@@ -62,7 +62,7 @@ class Checked:
 
 @dataclass(frozen=True)
 class CheckTask:
-    """A report in HTML or PDF; with `again`, its requests are answered anew."""
+    """A report in HTML or PDF; with `again`, its requests are answered again."""
 
     file: bytes
     again: bool
@@ -75,7 +75,7 @@ class CheckTask:
 
 
 def checked(file: bytes, again: bool, request_id: str) -> Checked:
-    """The checks of a report in HTML or PDF; with `again`, the requests are answered anew.
+    """The checks of a report in HTML or PDF; with `again`, the requests are answered again.
 
     Raises NoReport, NotCertified, and the errors of answering.
     """
@@ -83,7 +83,7 @@ def checked(file: bytes, again: bool, request_id: str) -> Checked:
     lines = [*_motions(bundle), *_sums(bundle)]
     if not file.startswith(b"%PDF"):
         same = page(report_of(bundle), bundle) == file
-        words = "is what its documents give" if same else "is not what its documents give"
+        words = "agrees with its documents" if same else "differs from its documents"
         lines.append(Line("page", words, same))
     if again:
         lines += _again(bundle, request_id)
@@ -102,7 +102,7 @@ def _motions(bundle: Bundle) -> list[Line]:
     elif bundle.kind == "placement":
         for row in bundle.moves:
             moves += [
-                (f"{label}, {row['place']} place", move, answer)
+                (f"{label} at the {row['place']} place", move, answer)
                 for label, move, answer in _moves_of(of_cycle(bundle, row))
             ]
     elif bundle.kind != "evaluate":
@@ -130,14 +130,15 @@ def _placed_sums(bundle: Bundle) -> Iterator[Line]:
     """The cycles of a placement, and the energies of its places as sums of them."""
     for row in bundle.moves:
         for line in _sums(of_cycle(bundle, row)):
-            yield replace(line, what=f"{line.what}, {row['place']} place")
+            yield replace(line, what=f"{line.what} at the {row['place']} place")
     objective = bundle.answer["objective"]
     for place in dict.fromkeys(row["place"] for row in bundle.moves):
         parts = (
             row["weight"] * row["answer"]["energy"][objective]["total"]
             for row in rows_at(bundle, place)
         )
-        yield _sum(f"cycles, {place} place", bundle.answer[place]["energy"], parts, SUM_TOLERANCE)
+        stated = bundle.answer[place]["energy"]
+        yield _sum(f"cycles at the {place} place", stated, parts, SUM_TOLERANCE)
 
 
 def _sums(bundle: Bundle) -> Iterator[Line]:
@@ -173,15 +174,15 @@ def _again(bundle: Bundle, request_id: str) -> Iterator[Line]:
     """The requests, answered anew."""
     if bundle.kind == "job":
         for row in answered_rows(bundle.moves):
-            what = f"no. {row['index'] + 1} answered anew"
+            what = f"no. {row['index'] + 1} answered again"
             yield _anew(row["kind"], row["request"], row["answer"], request_id, what)
     elif bundle.kind == "placement":
         for row in bundle.moves:
             if row["request"] is not None:
-                what = f"cycle answered anew, {row['place']} place"
+                what = f"cycle at the {row['place']} place, answered again"
                 yield _anew("cycle", row["request"], row["answer"], request_id, what)
     elif bundle.kind != "evaluate":
-        what = "request answered anew"
+        what = "request answered again"
         yield _anew(bundle.kind, bundle.request, bundle.answer, request_id, what)
         yield from _advised_anew(bundle)
     else:
@@ -205,8 +206,8 @@ def _read_again(bundle: Bundle, request_id: str) -> Iterator[Line]:
             for each in (bundle.answer, found)
         )
         if stated is not None and own is not None:
-            words = {"electrical": "measured by power", "by_efforts": "measured by efforts"}
-            yield _line(f"{words.get(name, name)}, anew", stated, own, RECOMPUTED_TOLERANCE)
+            words = {"electrical": "measured from power", "by_efforts": "measured from efforts"}
+            yield _line(f"{words.get(name, name)}, again", stated, own, RECOMPUTED_TOLERANCE)
 
 
 def _anew(kind: str, request: Json, answer: Json, request_id: str, what: str) -> Line:
@@ -229,7 +230,7 @@ def _advised_anew(bundle: Bundle) -> Iterator[Line]:
     energies = {each.name: each.energy for each in found.advice}
     for each in known["advice"]:
         own = energies.get(each["name"], math.nan)
-        yield _line(f"{each['name']}, anew", each["energy"], own, ANSWER_TOLERANCE)
+        yield _line(f"{each['name']} computed again", each["energy"], own, ANSWER_TOLERANCE)
 
 
 def _sum(what: str, stated: float, parts: Any, tolerance: float) -> Line:

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from joulepath.app.api.report.bundle import Bundle
-from joulepath.app.api.report.numbers import JOULES_PER_KWH, amount, digits, down, percent, up
+from joulepath.app.api.report.numbers import JOULES_PER_KWH, amount, digits, interval_of, percent
 from joulepath.app.api.report.report import Change, Cost, Fact
 
 SHIFT = 8 * 3600.0
 """Length of a shift filled with cycles [s], without a given number."""
 _CHANGES = {
-    "whole_cycle": "Move over the whole time, without a wait",
-    "brakes": "Brakes at rest, 0.5 s after standstill",
-    "without_home": "Leave out the way home",
-    "shorter_stops": "Every stop 0.1 s shorter",
-    "lighter_tool": "A tool of half the mass",
+    "whole_cycle": "Use the whole cycle time",
+    "brakes": "Brakes after 0.5 s at rest",
+    "without_home": "Omit the start position",
+    "shorter_stops": "Dwells 0.1 s shorter",
+    "lighter_tool": "Tool of half the mass",
 }
 
 
@@ -26,8 +26,8 @@ class Money:
 
     energy: float
     """Of a cycle [J], with its wait, and with the control box if it is counted."""
-    likely: tuple[float, float] | None
-    """5th and 95th percentile of it [J]."""
+    likely: dict[str, float] | None
+    """Its 5th and 95th percentile `p5` and `p95` [J]."""
     cycles: float
     """Per shift."""
     filled: bool
@@ -58,7 +58,7 @@ class Money:
             # how well a wait is known is not computed
             likely=None
             if known is None or waiting(bundle)
-            else (known["p5"] + more, known["p95"] + more),
+            else {end: known[end] + more for end in ("p5", "p95")},
             cycles=SHIFT / length if cycles is None else cycles,
             filled=cycles is None,
             shifts=_value(costs, "shifts_per_year"),
@@ -85,43 +85,37 @@ def facts(bundle: Bundle, money: Money) -> tuple[Fact, ...]:
     """The leading figures: one cycle, a shift, a year, money."""
     word = bundle.what
     known = bundle.answer["energy"]["electrical"].get("interval")
-    likely = "" if known is None else f", likely {down(known['p5'])} to {up(known['p95'])}"
     total = bundle.answer["energy"]["electrical"]["total"]
     found = [
-        Fact(digits(total), "J", f"a {word}{likely}{_with_wait(bundle)}"),
+        Fact(digits(total), "J", f"per {word}{interval_of(known)}{_with_wait(bundle)}"),
         Fact(
             digits(_kwh(money, money.cycles), 2),
             "kWh",
-            f"a shift of {'8 h, ' if money.filled else ''}{round(money.cycles):,} {word}s",
+            f"per shift{' of 8 h' if money.filled else ''} ({round(money.cycles):,} {word}s)",
         ),
     ]
     if money.shifts is None:
         return tuple(found)
     yearly = money.cycles * money.shifts
-    range_ = (
-        ""
-        if money.likely is None
-        else f", likely {down(money.likely[0] * yearly / JOULES_PER_KWH)} to "
-        f"{up(money.likely[1] * yearly / JOULES_PER_KWH)}"
-    )
-    found.append(Fact(digits(_kwh(money, yearly)), "kWh", f"a year{range_}"))
+    range_ = interval_of(money.likely, yearly / JOULES_PER_KWH)
+    found.append(Fact(digits(_kwh(money, yearly)), "kWh", f"per year{range_}"))
     if money.price is not None:
         carbon = (
             ""
             if money.carbon is None
-            else f"and {digits(_kwh(money, yearly) * money.carbon)} kg CO2e "
+            else f", with {digits(_kwh(money, yearly) * money.carbon)} kg CO2e"
         )
         cost = _kwh(money, yearly) * money.price
         shown = amount(cost) if cost < 10 else digits(cost, 2)
-        found.append(Fact(shown, money.currency, f"{carbon}a year"))
+        found.append(Fact(shown, money.currency, f"per year{carbon}"))
     elif money.carbon is not None:
-        found.append(Fact(digits(_kwh(money, yearly) * money.carbon), "kg", "CO2e a year"))
+        found.append(Fact(digits(_kwh(money, yearly) * money.carbon), "kg", "CO2e per year"))
     return tuple(found)
 
 
 def _with_wait(bundle: Bundle) -> str:
     more = waiting(bundle)
-    return f", and {digits(more)} J of waiting" if more else ""
+    return f", plus {digits(more)} J of waiting" if more else ""
 
 
 def advice_table(bundle: Bundle, money: Money) -> tuple[Change, ...]:
@@ -135,9 +129,9 @@ def advice_table(bundle: Bundle, money: Money) -> tuple[Change, ...]:
             f"saves {percent(each['share'])}",
             ""
             if yearly is None
-            else f"{amount(each['saving'] * yearly * money.price)} {money.currency} a year"
+            else f"{amount(each['saving'] * yearly * money.price)} {money.currency} per year"
             if money.price is not None
-            else f"{digits(each['saving'] * yearly, 2)} kWh a year",
+            else f"{digits(each['saving'] * yearly, 2)} kWh per year",
         )
         for each in given
     )
@@ -146,20 +140,21 @@ def advice_table(bundle: Bundle, money: Money) -> tuple[Change, ...]:
 def advice_note(bundle: Bundle) -> str:
     """How the changes were computed."""
     word = bundle.what
-    if waiting(bundle):
-        over = f"All take {digits(cycle_time(bundle))} s. Further changes are compared with the "
-        beside = f"{word} over that time, so that no saving is counted twice."
-    else:
-        over, beside = "", f"Compared with this {word}, for as many {word}s a year."
-    return f"Each change by itself: computed, not estimated. {over}{beside}"
+    compared = (
+        f"All changes take {digits(cycle_time(bundle))} s. All but the first are compared with the "
+        f"{word} of this duration, so that no saving is counted twice."
+        if waiting(bundle)
+        else f"It is compared with this {word}, for the same number of {word}s per year."
+    )
+    return f"Each change is optimised separately, not estimated. {compared}"
 
 
 def cost_table(bundle: Bundle, money: Money) -> tuple[Cost, ...]:
     """A row for a cycle, a shift, and a year if its shifts are given."""
     word = bundle.what
-    rows = [(f"1,000 {word}s", 1000.0), ("a shift", money.cycles)]
+    rows = [(f"1,000 {word}s", 1000.0), ("1 shift", money.cycles)]
     if money.shifts is not None:
-        rows.append(("a year", money.cycles * money.shifts))
+        rows.append(("1 year", money.cycles * money.shifts))
     return tuple(
         Cost(
             period,
@@ -184,9 +179,9 @@ def costs_note(money: Money) -> str:
     ]
     given = f"Not given: {', '.join(missing)}. " if missing else ""
     box = (
-        "The control box itself and the loss of the mains are not counted: no reading is given."
+        "The control box and mains losses are not included, because no measured power is given."
         if money.box is None
-        else f"The control box is counted with {digits(money.box)} W."
+        else f"The control box is included with {digits(money.box)} W."
     )
     return given + box
 

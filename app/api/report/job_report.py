@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from joulepath.app.api.report.assumptions import assumptions, interval_note
-from joulepath.app.api.report.bundle import COMPUTED, Bundle
+from joulepath.app.api.report.bundle import Bundle
 from joulepath.app.api.report.costs import Money, cost_table, costs_note, facts
 from joulepath.app.api.report.drawings import Bar, drawn_bars
 from joulepath.app.api.report.job_rows import answered, rivals_of
@@ -37,7 +37,7 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.picture.cell_picture import cell_picture
 
 Json = dict[str, Any]
-_NEAREST = "The nearest of each move"
+_NEAREST = "Best baseline of each move"
 
 
 def job_report(bundle: Bundle) -> Report:
@@ -46,40 +46,42 @@ def job_report(bundle: Bundle) -> Report:
     motions = [row for row in rows if "trajectory" in row["answer"]]
     if not motions or len({row["answer"]["robot"] for row in rows}) > 1:
         raise InvalidProblem(
-            "job", "A report needs a job with motions, all of one robot: this job has none such."
+            "job",
+            "A report needs a job with motions, all of one robot; this job has no motion, or has "
+            "several robots.",
         )
     electrical, money = bundle.answer["energy"]["electrical"], Money.of(bundle)
     most = max(motions, key=_joules)
     shown = program_of_motion(most["request"], most["answer"])
     masses = [arm_of(row["request"], row["answer"]).payload.mass for row in motions]
     return Report(
-        title=bundle.title or bundle.request.get("name") or "A table of moves",
+        title=bundle.title or bundle.request.get("name") or "Energy of a job",
         subtitle=bundle.subtitle(shown.robot),
         lead=tuple(map(unbroken, _lead(bundle))),
         facts=facts(bundle, money),
         picture=cell_picture(shown),
-        caption=f"The move of most energy: {_name(most)}, {digits(_joules(most))} J. The arm is "
-        "shown at its goal, and pale at its start, as its collisions are checked.",
-        rivals_title="Against the usual ways",
+        caption=f"The move that needs the most energy: {_name(most)}, {digits(_joules(most))} J. "
+        "The picture shows the bodies of the collision check: the arm at the goal and at the start "
+        "(pale).",
+        rivals_title="Comparison with baselines",
         rivals=_rivals(bundle),
-        rivals_note="Each usual way is summed over the moves in which it keeps every limit, in the "
-        "same time, and compared with the answers to those moves alone, as its bar is. No saving "
-        "is claimed in the others.",
+        rivals_note="The saving and the bar of each baseline compare only the moves in which it "
+        "keeps every limit, in the same time. No saving is claimed in the other moves.",
         parts=parts_of(electrical),
         course_title="Energy of each move",
-        course_note="in the order of the table, in J, with its interval",
+        course_note="In J, in the order of the table, with 90 % intervals.",
         course=drawn_bars(
             [Bar.of(str(row["index"] + 1), row["answer"]["energy"]["electrical"]) for row in rows]
         ),
         costs=cost_table(bundle, money),
         currency=money.currency,
-        costs_note=f"A run is all moves of the table once. {costs_note(money)}",
-        proven_title="Proven",
+        costs_note=f"A run consists of every move of the table once. {costs_note(money)}",
+        proven_title="Certificate",
         proven=unbroken(_proven(rows)),
         check=bundle.how_to_check(None),
         assumptions=assumptions(most["request"], bundle.costs, shown.robot, masses),
         assumptions_note=unbroken(interval_note(electrical.get("interval"))),
-        foot=f"{COMPUTED} joulepath {bundle.version}",
+        foot=bundle.foot,
         table=_table(bundle.moves),
     )
 
@@ -100,20 +102,21 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
     rows, answer = answered(bundle.moves), bundle.answer
     total = answer["energy"]["electrical"]["total"]
     first = (
-        f"{_moves(len(rows))} need{'s' if len(rows) == 1 else ''} *{digits(total)} J* together, "
+        f"{_moves(len(rows))} need{'s' if len(rows) == 1 else ''} *{digits(total)} J* in total, "
         f"in {digits(answer['duration'])} s of motion"
     )
     count, theirs, ours = rivals_of(rows).get("nearest", (0, 0.0, 0.0))
     claim = (
-        ". No usual way is known that keeps every limit: no saving is claimed."
+        ". No baseline keeps every limit, so no saving is claimed."
         if not count
-        else f". In the {_moves(count)} in which a usual way keeps every limit, the answers need "
-        f"{_against(saving(ours, theirs))} the nearest such way of each, in the same time."
+        else f". In the {_moves(count)} with a baseline within all limits, the optimised motions "
+        f"need {_against(saving(ours, theirs))} the best of these baselines in the same time."
     )
     left = [row for row in bundle.moves if row["answer"] is None]
     have = "has" if len(left) == 1 else "have"
     others = f" {len(left):,} of {len(bundle.moves):,} moves {have} no answer." if left else ""
-    least = above_least("No way to make them", total, answer["energy"]["lower_bound"])
+    bound = answer["energy"]["lower_bound"]
+    least = above_least("No set of motions for these moves", total, bound)
     return first + claim, least + others
 
 
@@ -129,7 +132,7 @@ def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
     ratios = {name: share(theirs, ours) for name, (_, theirs, ours) in found.items()}
     most = max([1.0, *ratios.values()])
     own = Rival(
-        "These answers",
+        "Optimised motions",
         _moves(len(answered(bundle.moves))),
         f"{digits(total)} J",
         1 / most,
@@ -170,31 +173,40 @@ def _proven(rows: list[Json]) -> str:
         if each.get("clearance") is not None
     ]
     every = f"all {_moves(len(rows))}" if len(rows) > 1 else "the move"
-    sentences = [f"Every limit is kept in {every}: {limits_used(worst)} at most."]
+    sentences = [f"All limits are kept in {every}. {limits_used(worst)}"]
     if checked:
         least, row = min(checked, key=lambda each: float(each[0]))
         sentences.append(
-            f"Bodies stay at least {down(1e3 * least, 2)} mm beyond their margins, the nearest in "
-            f"{_name(row)}, proven between the samples too."
+            f"All bodies keep at least {down(1e3 * least, 2)} mm more than the required clearance "
+            f"at every instant; the nearest are those in {_name(row)}."
         )
     if len(checked) < len(rows):
         unchecked = _moves(len(rows) - len(checked))
         sentences.append(f"Collisions were not checked in {unchecked}.")
     error = max(each["energy_error"] for each in certificates)
     sentences.append(
-        "A second program, which shares nothing with the solver but the motion, finds the same "
-        f"energies within {up(100 * error, 1)} %."
+        "A computation with Pinocchio, independent of the solver, gives the same energies within "
+        f"{up(100 * error, 1)} %."
     )
     return " ".join(sentences)
 
 
 def _table(rows: list[Json]) -> Table:
     return Table(
-        title="The moves",
-        note="Likely: from the 5th to the 95th percentile. Nearest: the usual way within every "
-        "limit against which least is saved, in the same time. Least: what no motion can need less "
-        "than.",
-        head=("no.", "move", "kg", "s", "J", "likely, J", "nearest, J", "saves", "least, J"),
+        title="Moves",
+        note="Interval: from the 5th to the 95th percentile. Baseline: the best baseline within "
+        "all limits, in the same time. Lower bound: no motion needs less.",
+        head=(
+            "no.",
+            "move",
+            "kg",
+            "s",
+            "J",
+            "interval, J",
+            "baseline, J",
+            "saving",
+            "lower bound, J",
+        ),
         rows=tuple(map(_cells, rows)),
         words=2,
     )

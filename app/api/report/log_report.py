@@ -7,7 +7,15 @@ from typing import Any
 from joulepath.app.api.report.assumptions import assumptions, interval_note
 from joulepath.app.api.report.bundle import Bundle
 from joulepath.app.api.report.drawings import Bar, drawn_bars
-from joulepath.app.api.report.numbers import digits, down, percent, share, unbroken, up
+from joulepath.app.api.report.numbers import (
+    digits,
+    down,
+    interval_of,
+    percent,
+    share,
+    unbroken,
+    up,
+)
 from joulepath.app.api.report.report import Fact, Report, Rival, Table
 from joulepath.app.api.report.rivals import listed, parts_of
 from joulepath.app.convert.given_answer import arm_of
@@ -16,9 +24,9 @@ from joulepath.optimizer.dynamics.losses import ENERGY_FLOOR
 Json = dict[str, Any]
 _BY = {"electrical": "power", "by_efforts": "currents or torques"}
 _SOURCES = {
-    "electrical": "Measured energy is the integral of the logged power of the arm's bus.",
-    "by_efforts": "Measured energy is computed from the logged currents or torques: shaft work, "
-    "the losses of the robot's drives, and its idle power.",
+    "electrical": "Energy measured from power is the integral of the power of the arm's bus.",
+    "by_efforts": "Energy measured from currents or torques is the sum of shaft work, losses of "
+    "the robot's drives and idle power.",
 }
 
 
@@ -28,31 +36,31 @@ def log_report(bundle: Bundle) -> Report:
     total, segments = answer["total"], answer["segments"]
     moves = [(k, each) for k, each in enumerate(segments, 1)]
     electrical = total["energy"]["electrical"]
-    told = "yours" if "payload" in bundle.request else "the log"
+    told = "yours" if "payload" in bundle.request else "from the log"
     name = ((bundle.log or {}).get("settings") or {}).get("name")
     return Report(
-        title=bundle.title or name or "A log",
+        title=bundle.title or name or "Energy of a log",
         subtitle=bundle.subtitle(arm.robot),
         lead=tuple(map(unbroken, _lead(answer))),
         facts=_facts(answer),
         picture="",
         caption="",
-        rivals_title="Measured against predicted",
+        rivals_title="Measured and predicted energy",
         rivals=_bars(total),
-        rivals_note="Likely: from the 5th to the 95th percentile of the prediction.",
+        rivals_note="90 % interval: from the 5th to the 95th percentile of the prediction.",
         parts=parts_of(electrical),
         course_title="Energy of each move and rest",
-        course_note="in J: the bar as predicted, with its interval; the dot as measured",
+        course_note="In J: bars with 90 % intervals are predicted, dots are measured.",
         course=drawn_bars([_bar(k, each) for k, each in moves]),
         costs=(),
         currency="",
         costs_note="",
-        proven_title="What was compared",
+        proven_title="Sources of the energies",
         proven=unbroken(_compared(answer)),
         check=bundle.how_to_check(None),
         assumptions=assumptions(bundle.request, None, arm.robot, [arm.payload.mass], told),
         assumptions_note=unbroken(interval_note(electrical.get("interval"))),
-        foot=f"Predicted by joulepath {bundle.version}; measured by whoever logged it.",
+        foot=f"Predicted energies: joulepath {bundle.version}. Measured energies: from the log.",
         table=_table(moves, total),
     )
 
@@ -78,26 +86,22 @@ def _more(difference: float) -> str:
 def _lead(answer: Json) -> tuple[str, ...]:
     total, segments = answer["total"], answer["segments"]
     electrical, found = total["energy"]["electrical"], measured(total)
-    likely = electrical.get("interval")
-    known = "" if likely is None else f" (likely {down(likely['p5'])} to {up(likely['p95'])} J)"
-    predicted = f"*{digits(electrical['total'])} J*{known}"
+    interval = interval_of(electrical.get("interval")).removeprefix(", ")
+    predicted = f"*{digits(electrical['total'])} J*" + (f" ({interval} J)" if interval else "")
     length = f"{digits(answer['duration'])} s"
     if found is None:
         return (
-            f"For the motion of this log, {length} long, {predicted} are predicted.",
-            "Neither power nor currents nor torques were logged: nothing is measured.",
+            f"The logged motion takes {length}, and its predicted energy is {predicted}.",
+            "The log contains no power, currents or torques, so there is no measured energy.",
         )
-    first = (
-        f"In {length}, the arm drew *{digits(found[1])} J* by the logged {_BY[found[0]]}; "
-        f"{predicted} are predicted"
-    )
     difference = total["difference"]
-    first += "." if difference is None else f": measured is *{_more(difference)}*."
+    compared = "compared with" if difference is None else f"*{_more(difference)}* than"
     inside = [within for within in map(_within, segments) if within is not None]
     return (
-        first,
-        f"{sum(inside)} of {len(inside)} moves and rests lie within the interval of their "
-        "prediction, which should hold nine of ten."
+        f"In {length}, the arm drew *{digits(found[1])} J* according to the logged "
+        f"{_BY[found[0]]}, {compared} the predicted {predicted}.",
+        f"The measured energies of {sum(inside)} of {len(inside)} moves and rests lie within their "
+        "90 % intervals; nine of ten are expected."
         if inside
         else "",
     )
@@ -106,15 +110,14 @@ def _lead(answer: Json) -> tuple[str, ...]:
 def _facts(answer: Json) -> tuple[Fact, ...]:
     total = answer["total"]
     electrical, found = total["energy"]["electrical"], measured(total)
-    likely = electrical.get("interval")
-    known = "" if likely is None else f", likely {down(likely['p5'])} to {up(likely['p95'])}"
-    facts = [Fact(digits(electrical["total"]), "J", f"predicted{known}")]
+    predicted = f"predicted{interval_of(electrical.get('interval'))}"
+    facts = [Fact(digits(electrical["total"]), "J", predicted)]
     if found is not None:
-        facts.insert(0, Fact(digits(found[1]), "J", f"measured by {_BY[found[0]]}"))
+        facts.insert(0, Fact(digits(found[1]), "J", f"measured from {_BY[found[0]]}"))
     if total["difference"] is not None:
         sign = "+" if total["difference"] >= 0 else "−"
         share = f"{sign}{100 * abs(total['difference']):.1f}"
-        facts.append(Fact(share, "%", "measured beyond predicted"))
+        facts.append(Fact(share, "%", "measured relative to predicted"))
     facts.append(
         Fact(
             f"{answer['segment_count']:,}", "", f"moves and rests in {digits(answer['duration'])} s"
@@ -125,7 +128,9 @@ def _facts(answer: Json) -> tuple[Fact, ...]:
 
 def _bars(total: Json) -> tuple[Rival, ...]:
     known, predicted = total["measured"] or {}, total["energy"]["electrical"]["total"]
-    shown = [(f"Measured by {_BY[by]}", value) for by, value in known.items() if value is not None]
+    shown = [
+        (f"Measured from {_BY[by]}", value) for by, value in known.items() if value is not None
+    ]
     most = max([ENERGY_FLOOR, predicted, *(value for _, value in shown)])
 
     def rival(name: str, value: float, more: str, ours: bool = False) -> Rival:
@@ -147,8 +152,8 @@ def _compared(answer: Json) -> str:
     known = answer["total"]["measured"] or {}
     sentences = [text for by, text in _SOURCES.items() if known.get(by) is not None]
     sentences.append(
-        "Predicted energy is that of the logged positions over time, with the figures beside; "
-        "nothing of the measurement is in it."
+        "Predicted energy is computed from the logged positions over time and the listed "
+        "assumptions, without any measured energy."
     )
     broken = [each["limit"] for each in answer["limits"] if not each["held"]]
     if broken:
@@ -158,18 +163,18 @@ def _compared(answer: Json) -> str:
 
 def _table(moves: list[tuple[int, Json]], total: Json) -> Table:
     return Table(
-        title="The moves",
-        note="Likely: from the 5th to the 95th percentile of the prediction. Difference: measured "
-        "beyond predicted.",
+        title="Moves and rests",
+        note="Interval: from the 5th to the 95th percentile of the prediction. Difference: "
+        "measured relative to predicted.",
         head=(
             "no.",
-            "from, s",
-            "s",
+            "start, s",
+            "duration, s",
             "measured, J",
             "predicted, J",
-            "likely, J",
+            "interval, J",
             "difference",
-            "within",
+            "in interval",
         ),
         rows=(*(_cells(str(k), part) for k, part in moves), _cells("all", total)),
         words=1,

@@ -50,10 +50,10 @@ MAP = MapSettings()
 REASONS = {
     "reach": ("M-1 -1L1 1M1 -1L-1 1", "out of reach"),
     "collision": ("M-1 -1H1V1H-1Z", "in collision"),
-    "torque": ("M-1 -0.8H1L0 1Z", "too little torque"),
+    "torque": ("M-1 -0.8H1L0 1Z", "insufficient torque"),
     "time": ("M-1 0.8H1L0 -1Z", "takes too long"),
     "motion": ("M-1 0H1M0 -1V1", "no motion found"),
-    None: ("M-0.2 0H0.2", "left out"),
+    None: ("M-0.2 0H0.2", "not computed"),
 }
 """Mark and words of places without an energy, by the reason."""
 

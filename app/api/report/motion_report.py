@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from joulepath.app.api.report.assumptions import assumptions, interval_note
-from joulepath.app.api.report.bundle import COMPUTED, Bundle
+from joulepath.app.api.report.bundle import Bundle
 from joulepath.app.api.report.costs import (
     Money,
     advice_note,
@@ -33,6 +33,12 @@ from joulepath.optimizer.dynamics.losses import ENERGY_FLOOR
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.picture.cell_picture import cell_picture, stops_of
 
+LEGS_NOTE = (
+    "Bars are legs: width shows duration, height mean power, number energy in J; filled bars carry "
+    "a part. Curve: supply power."
+)
+"""Explanation of a drawing with legs."""
+
 
 def motion_report(bundle: Bundle, program: Program) -> Report:
     """The report of documents with the motions of `program`."""
@@ -41,26 +47,23 @@ def motion_report(bundle: Bundle, program: Program) -> Report:
     course = course_of(bundle, program)
     several = len(course.legs) > 1
     return Report(
-        title=bundle.title or ("A cycle of stops" if bundle.kind == "cycle" else "A motion"),
+        title=bundle.title or f"Energy of a {bundle.what}",
         subtitle=bundle.subtitle(program.robot),
         lead=tuple(map(unbroken, _lead(bundle))),
         facts=facts(bundle, money),
         picture=cell_picture(program),
         caption=_caption(program),
-        rivals_title="Against the usual ways",
+        rivals_title="Comparison with baselines",
         rivals=_rivals(bundle),
         rivals_note=_rivals_note(bundle),
         parts=parts_of(answer["energy"]["electrical"]),
-        course_title="The cycle" if several else "The motion",
-        course_note="each leg as wide as its time and as high as its mean power, with its joules; "
-        "filled with a part in hand. Below, the power from the supply"
-        if several
-        else "power from the supply over time",
+        course_title=f"Power over the {bundle.what}",
+        course_note=LEGS_NOTE if several else "Drawn from the supply, in W.",
         course=drawn(course),
         costs=cost_table(bundle, money),
         currency=money.currency,
         costs_note=costs_note(money),
-        proven_title="Proven",
+        proven_title="Certificate",
         proven=unbroken(proven(answer)),
         check=bundle.how_to_check(answer.get("id")),
         assumptions=assumptions(
@@ -73,18 +76,21 @@ def motion_report(bundle: Bundle, program: Program) -> Report:
         assumptions_note=unbroken(interval_note(answer["energy"]["electrical"].get("interval"))),
         changes=advice_table(bundle, money),
         changes_note=unbroken(advice_note(bundle)),
-        foot=f"{COMPUTED} joulepath {bundle.version}",
+        foot=bundle.foot,
     )
 
 
 def _caption(program: Program) -> str:
-    shown = "The cell as its collisions are checked: the arm "
-    if len(program.moves) == 1:
-        return shown + "at the goal, and pale at the start, with the way of the TCP."
-    if any(move.arm.payload.mass > 0 for move in program.moves):
-        shown += "where the first part is put down, and pale at the start. "
-        return shown + "Way of the TCP: in full with a part, dashed without."
-    return shown + "at the end of the first move, and pale at the start, with the way of the TCP."
+    place, path = "at the goal", "the path of the TCP"
+    if len(program.moves) > 1:
+        place = "at the end of the first move"
+        if any(move.arm.payload.mass > 0 for move in program.moves):
+            place = "where it puts down the first part"
+            path += " (solid with a part, dashed without)"
+    return (
+        f"The bodies of the collision check: the arm {place}, the arm at the start (pale), and "
+        f"{path}."
+    )
 
 
 def _lead(bundle: Bundle) -> tuple[str, ...]:
@@ -95,35 +101,30 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
     kind = "" if objective == "electrical" else " of mechanical work"
     length = cycle_time(bundle)
     waits = length > answer["duration"] and objective == "electrical"
-    wait, within = f", with the wait until {digits(length)} s" if waits else "", ""
+    wait, within = f", including the wait until {digits(length)} s" if waits else "", ""
     if held := waiting(bundle):
         within = " in this time"
-        wait = f" and, with the wait until {digits(length)} s, *{digits(total + held)} J a cycle*"
+        wait = f" and, with the wait until {digits(length)} s, *{digits(total + held)} J*"
     first = (
         f"One {word}{stops} needs *{digits(total)} J{kind}* in {digits(answer['duration'])} s{wait}"
     )
     best = nearest_rival(answer, length if length > answer["duration"] else None)
     if best is None:
-        claim = f". No usual way is known that keeps every limit{within}: no saving is claimed."
+        claim = f". No baseline keeps every limit{within}, so no saving is claimed."
     elif best["saving"] < -REPORT.equal:
         more = percent(-_share(answer, best, held))
-        name, time = rival_name(best), digits(best["duration"])
         claim = (
-            f": {more} more than a usual way that keeps every limit, {_words(best)}. What needs "
-            "less is below."
+            f": {more} more than {_words(best)}. Changes that save energy are listed below."
             if held
-            else f". With a wait until the {time} s of a usual way that keeps every limit, “{name}”"
-            f", it needs {more} more: ask for a {word} over that time."
+            else f". With a wait until {digits(best['duration'])} s, it needs {more} more than "
+            f"{_words(best)}: request a {word} of this duration."
         )
     elif best["saving"] < REPORT.equal:
-        claim = f", as much as the nearest usual way that keeps every limit, {_words(best)}."
+        claim = f", as much as {_words(best)}."
     else:
         less = percent(_share(answer, best, held))
-        claim = (
-            f": *{less} less* than the nearest usual way that keeps every limit, {_words(best)}."
-            f"{_yearly(bundle, best)}"
-        )
-    return first + claim, above_least(f"No {word} of any kind", total, bound)
+        claim = f": *{less} less* than {_words(best)}.{_yearly(bundle, best)}"
+    return first + claim, above_least(f"No {word} for this task", total, bound)
 
 
 def _saved(answer: dict[str, Any], rival: dict[str, Any]) -> float:
@@ -149,11 +150,11 @@ def _yearly(bundle: Bundle, rival: dict[str, Any]) -> str:
     if bundle.answer["objective"] != "electrical" or money.shifts is None:
         return ""
     joules = _saved(bundle.answer, rival) * money.cycles * money.shifts
-    return f" In a year that is {money.in_words(joules)}."
+    return f" This saves {money.in_words(joules)} per year."
 
 
 def _words(rival: dict[str, Any]) -> str:
-    return f"“{rival_name(rival)}”, in the same time"
+    return f"the best baseline within all limits (“{rival_name(rival)}”) in the same time"
 
 
 def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
@@ -192,22 +193,22 @@ def _broken(rival: dict[str, Any]) -> str:
     """Why no saving is claimed, in two words."""
     moves = rival.get("broken", [rival])
     reasons = [each for move in moves for each in (move.get("reason") or "").split("; ")]
-    return "collides" if all("closer than" in each for each in reasons) else "breaks a limit"
+    return "collides" if all("closer than" in each for each in reasons) else "exceeds a limit"
 
 
 def _rivals_note(bundle: Bundle) -> str:
     length = cycle_time(bundle)
     best = nearest_rival(bundle.answer, length if length > bundle.answer["duration"] else None)
     rule = (
-        "A saving is claimed only against a way that keeps every limit, in the same time: the "
-        "shorter of both waits, and its wait is priced. Hatched: no saving."
+        "Savings are claimed only against baselines within all limits. The faster motion waits for "
+        "the slower one; its wait is included. Hatched: no claim."
     )
     known = None if best is None else best.get("saving_interval")
     if known is None:
         return rule
     name = "" if best is None else rival_name(best)
     low, high = percent(known["p5"], "down"), percent(known["p95"], "up")
-    return f"Against “{name}” the saving is likely {low} to {high}. {rule}"
+    return f"90 % interval of the saving against “{name}”: {low} to {high}. {rule}"
 
 
 def course_of(bundle: Bundle, program: Program) -> Course:
@@ -243,20 +244,20 @@ def course_of(bundle: Bundle, program: Program) -> Course:
 def proven(answer: dict[str, Any]) -> str:
     """Statements of the certificate of an answer, in sentences."""
     used = limits_used(answer["certificate"]["worst_ratio"])
-    sentences = [f"Every limit is kept: {used}."]
+    sentences = [f"All limits are kept. {used}"]
     clearance = answer["certificate"].get("clearance")
     if clearance is not None:
         one, other = (name.replace("_", " ") for name in clearance["pair"])
         left = 1e3 * clearance["min_clearance"]
         sentences.append(
-            f"Nearest pair: {one} and {other}, at least {down(left, 2)} mm beyond their margin, "
-            "proven between the samples too."
+            f"The nearest bodies, {one} and {other}, keep at least {down(left, 2)} mm more than "
+            "the required clearance at every instant."
         )
     else:
         sentences.append("Collisions were not checked.")
     error = answer["certificate"]["energy_error"]
     sentences.append(
-        f"A second program, which shares nothing with the solver but the motion, finds the same "
-        f"energy within {up(100 * error, 1)} %."
+        "A computation with Pinocchio, independent of the solver, gives the same energy within "
+        f"{up(100 * error, 1)} %."
     )
     return " ".join(sentences)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from joulepath.optimizer.dynamics.losses import share_of
 
@@ -55,6 +55,14 @@ def percent(share: float, rounding: str = "nearest") -> str:
 def share(value: float, energy: float) -> float:
     """A value over the amount of an energy [J]; 0 where there is none."""
     return share_of(value, energy) or 0.0
+
+
+def interval_of(known: Mapping[str, float] | None, factor: float = 1.0) -> str:
+    """The 90 % interval of an energy, as the end of a phrase; empty if it is unknown."""
+    if known is None:
+        return ""
+    ends = f"{down(known['p5'] * factor)} to {up(known['p95'] * factor)}"
+    return f", 90{SPACE}% interval {ends}"
 
 
 def counted(count: int, thing: str) -> str:

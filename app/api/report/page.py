@@ -41,14 +41,14 @@ def page(report: Report, bundle: Bundle) -> bytes:
         course=_course(report),
         costs=_costs(report),
         changes=_section(
-            "What would need less",
+            "Changes that save energy",
             _rows(map(_change, report.changes)) if report.changes else "",
             report.changes_note,
         ),
         proven=_section(report.proven_title, f"<p>{_rich(report.proven)}</p>"),
-        check=_section("Check it yourself", f"<p>{_rich(report.check)}</p>"),
+        check=_section("How to verify this report", f"<p>{_rich(report.check)}</p>"),
         assumptions=_section(
-            "What it rests on",
+            "Assumptions and their trust letters",
             f"<table>{''.join(map(_assumption, report.assumptions))}</table>",
             report.assumptions_note,
         ),
@@ -91,7 +91,7 @@ def _costs(report: Report) -> str:
     cells = "".join(f"<td>{escape(each)}</td>" for each in ("", "kWh", report.currency, "kg CO2e"))
     rows = "".join(map(_cost, report.costs))
     table = f"<table><thead><tr>{cells}</tr></thead><tbody>{rows}</tbody></table>"
-    return _section("What it costs", table, report.costs_note)
+    return _section("Energy costs", table, report.costs_note)
 
 
 def _table(table: Table) -> str:

@@ -42,7 +42,7 @@ def placed(
         answer = kept_answers([kept])[0]
         if "tolerance" not in answer or answer.get("robot") != asked.robot:
             raise InvalidProblem(
-                "answer", "This kept answer is of another request: leave `answer` out."
+                "answer", "The stored answer belongs to another request: leave `answer` out."
             )
         return answer, _rows(asked, answer, kept_answers)
     with inside("placement"):

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from joulepath.app.api.report.assumptions import assumptions, interval_note
-from joulepath.app.api.report.bundle import COMPUTED, Bundle
+from joulepath.app.api.report.bundle import Bundle
 from joulepath.app.api.report.costs import Money, cost_table, costs_note, facts
 from joulepath.app.api.report.drawings import Bar, drawn, drawn_bars
 from joulepath.app.api.report.job_rows import summed
 from joulepath.app.api.report.map_drawing import REASONS, drawn_map
-from joulepath.app.api.report.motion_report import course_of, proven
-from joulepath.app.api.report.numbers import digits, down, percent, share, unbroken, up
+from joulepath.app.api.report.motion_report import LEGS_NOTE, course_of, proven
+from joulepath.app.api.report.numbers import digits, down, interval_of, percent, share, unbroken
 from joulepath.app.api.report.placed import of_cycle, rows_at
 from joulepath.app.api.report.programs import program_of
 from joulepath.app.api.report.report import Fact, Report, Rival, Table
@@ -31,10 +31,10 @@ MOST_PLACES = 500
 _COULD = {
     "reach": "a stop is out of reach",
     "collision": "the arm collides",
-    "torque": "a joint has too little torque",
+    "torque": "the torque of a joint is insufficient",
     "time": "the cycle takes too long",
-    "motion": "no motion was found",
-    None: "there was no time for it",
+    "motion": "a move has no motion within the limits",
+    None: "the deadline left no time",
 }
 
 
@@ -53,21 +53,20 @@ def placement_report(bundle: Bundle) -> Report:
     moves = [move for program in programs for move in program.moves]
     several = len(best) > 1
     return Report(
-        title=bundle.title or "Where to put the robot",
+        title=bundle.title or "Placement of the robot",
         subtitle=bundle.subtitle(programs[0].robot),
         lead=tuple(map(unbroken, _lead(bundle, money))),
         facts=_facts(bundle, whole, money),
         picture=drawn_map(bundle.answer["map"], bundle.answer["best"], bundle.answer["nominal"]),
         caption=unbroken(_caption(bundle.answer)),
-        rivals_title="Against other places",
+        rivals_title="Comparison with other places",
         rivals=_rivals(bundle.answer),
         rivals_note=unbroken(_tolerance(bundle.answer)),
         parts=parts_of(electrical),
-        course_title="The cycles at the best place" if several else "The cycle at the best place",
-        course_note="energy of each, in J"
+        course_title="Energy of each cycle at the best place"
         if several
-        else "each leg as wide as its time and as high as its mean power, with its joules; filled "
-        "with a part in hand. Below, the power from the supply",
+        else "Power over the cycle at the best place",
+        course_note="In J, with 90 % intervals." if several else LEGS_NOTE,
         course=drawn_bars(
             [Bar.of(str(k), row["answer"]["energy"]["electrical"]) for k, row in enumerate(best, 1)]
         )
@@ -76,7 +75,7 @@ def placement_report(bundle: Bundle) -> Report:
         costs=cost_table(whole, money),
         currency=money.currency,
         costs_note=costs_note(money),
-        proven_title="Proven at the best place",
+        proven_title="Certificate of the best place",
         proven=unbroken(" ".join(proven(row["answer"]) for row in best)),
         check=bundle.how_to_check(bundle.answer.get("id")),
         assumptions=assumptions(
@@ -86,7 +85,7 @@ def placement_report(bundle: Bundle) -> Report:
             [move.arm.payload.mass for move in moves],
         ),
         assumptions_note=unbroken(interval_note(electrical.get("interval"))),
-        foot=f"{COMPUTED} joulepath {bundle.version}",
+        foot=bundle.foot,
         table=_table(bundle.answer),
     )
 
@@ -102,27 +101,27 @@ def _lead(bundle: Bundle, money: Money) -> tuple[str, ...]:
     best, nominal, saving = answer["best"], answer["nominal"], answer["saving"]
     kind = "" if answer["objective"] == "electrical" else " of mechanical work"
     first = (
-        f"At the best place that was found, {_subject(bundle)} *{digits(best['energy'])} J*{kind} "
+        f"At the best place found, {_subject(bundle)} *{digits(best['energy'])} J*{kind} "
         f"in {digits(best['duration'])} s"
     )
     if nominal is None:
-        first += f". At the nominal place there is none: {_COULD[answer['nominal_reason']]}."
+        first += f". The nominal place has no cycle: {_COULD[answer['nominal_reason']]}."
     elif saving is None or saving < REPORT.equal:
-        first += ". The nominal place is as good."
+        first += ". The nominal place is equally good."
     else:
         first += f": *{percent(saving)} less* than at the nominal place."
         if money.shifts is not None and answer["objective"] == "electrical":
             yearly = (nominal["energy"] - best["energy"]) * money.cycles * money.shifts
-            first += f" In a year that is {money.in_words(yearly)}."
+            first += f" This saves {money.in_words(yearly)} per year."
     second = above_least(
-        "No such cycle, wherever in the region,", best["energy"], answer["lower_bound"] or 0.0
+        "No cycle at any place of the region", best["energy"], answer["lower_bound"] or 0.0
     )
     return first, second
 
 
 def _subject(bundle: Bundle) -> str:
     count = len(rows_at(bundle, "best"))
-    return f"{count} cycles, each as often as its weight, need" if count > 1 else "the cycle needs"
+    return f"{count} cycles, multiplied by their weights, need" if count > 1 else "the cycle needs"
 
 
 def _facts(bundle: Bundle, whole: Bundle, money: Money) -> tuple[Fact, ...]:
@@ -132,20 +131,20 @@ def _facts(bundle: Bundle, whole: Bundle, money: Money) -> tuple[Fact, ...]:
     nominal = bundle.answer["nominal"]
     if nominal is not None and bundle.answer["objective"] == "electrical":
         known = summed(rows_at(bundle, "nominal"))["energy"]["electrical"]["interval"]
-        likely = "" if known is None else f", likely {down(known['p5'])} to {up(known['p95'])}"
-        found.append(Fact(digits(nominal["energy"]), "J", f"at the nominal place{likely}"))
+        words = f"at the nominal place{interval_of(known)}"
+        found.append(Fact(digits(nominal["energy"]), "J", words))
     return (*found, *others)
 
 
 def _caption(answer: Json) -> str:
     said = (
-        "The map of the region, seen from above: at each point the best of the places above one "
-        "another. The energies are those of certified cycles."
+        "Map of the region, seen from above. Every point shows the best of all heights there. "
+        "The energies are those of certified cycles."
     )
     if answer["left_out"]:
         said += (
-            f" {answer['left_out']:,} of {len(answer['map']):,} places were left out at the "
-            "deadline."
+            f" {answer['left_out']:,} of {len(answer['map']):,} places were not computed before "
+            "the deadline."
         )
     return said
 
@@ -154,11 +153,11 @@ def _rivals(answer: Json) -> tuple[Rival, ...]:
     best, nominal = answer["best"], answer["nominal"]
     known = [each["energy"] for each in answer["map"] if each["energy"] is not None]
     dearest = max([*known, best["energy"], *([] if nominal is None else [nominal["energy"]])])
-    others = {"The nominal place": nominal and nominal["energy"], "The dearest of the map": dearest}
-    time = {"The nominal place": nominal and f"{digits(nominal['duration'])} s"}
+    others = {"Nominal place": nominal and nominal["energy"], "Worst place of the map": dearest}
+    time = {"Nominal place": nominal and f"{digits(nominal['duration'])} s"}
     return (
         Rival(
-            "The best place",
+            "Best place",
             f"{digits(best['duration'])} s",
             f"{digits(best['energy'])} J",
             max(share(best["energy"], dearest), 0.0),
@@ -184,7 +183,7 @@ def _rivals(answer: Json) -> tuple[Rival, ...]:
 
 def _tolerance(answer: Json) -> str:
     """The best place and its tolerance, in words."""
-    said = f"The best place: {_name(answer, answer['best'])}."
+    said = f"Best place: {_name(answer, answer['best'])}."
     several = len({each["body"] for each in answer["tolerance"]}) > 1
     parts = list[str]()
     for each in answer["tolerance"]:
@@ -193,8 +192,8 @@ def _tolerance(answer: Json) -> str:
         ends = f"{_moved(each['lower'], name)} to {_moved(each['upper'], name)}"
         parts.append(f"{ends} in {name}{body}")
     if not parts:
-        return f"{said} How precisely it must be kept was not computed."
-    return f"{said} Within 2 % of its energy: off by {', or '.join(parts)}."
+        return f"{said} Its tolerance was not computed."
+    return f"{said} The energy rises by at most 2 % for an offset of {', or '.join(parts)}."
 
 
 def _moved(value: float, coordinate: str) -> str:
@@ -210,10 +209,10 @@ def _table(answer: Json) -> Table:
         key=lambda each: (each["energy"] is None, each["energy"] or 0.0, each["reason"] or ""),
     )
     return Table(
-        title="The places of the map",
-        note="Least: what the cycles at this place cannot need less than."
+        title="Places of the map",
+        note="Lower bound: no cycles at this place need less."
         + (f" The best {MOST_PLACES} of {len(places):,}." if len(places) > MOST_PLACES else ""),
-        head=("place", "J", "least, J"),
+        head=("place", "J", "lower bound, J"),
         rows=tuple(
             (_name(answer, each), REASONS[each["reason"]][1])
             if each["energy"] is None

@@ -11,40 +11,40 @@ from joulepath.app.api.report.report import Part
 
 _PARTS = {
     "friction": ("Friction in the joints", "#e08e2b"),
-    "idle": ("Electronics, always on", "#66778a"),
-    "dwell": ("Standing and waiting", "#c3cbd3"),
-    "copper": ("Copper of the motors", "#8c3b2a"),
+    "idle": ("Electronics (idle power)", "#66778a"),
+    "dwell": ("Waiting at standstill", "#c3cbd3"),
+    "copper": ("Copper loss in the motors", "#8c3b2a"),
     "potential": ("Lifting", "#3b8fc2"),
-    "inverter": ("Inverters", "#b9a24a"),
-    "braking": ("Braking resistor", "#b3261e"),
-    "kinetic": ("Left in motion", "#5b7fa6"),
-    "storage_loss": ("Loss of the storage", "#6c5b7b"),
+    "inverter": ("Loss in the inverters", "#b9a24a"),
+    "braking": ("Brake resistor", "#b3261e"),
+    "kinetic": ("Kinetic energy at the end", "#5b7fa6"),
+    "storage_loss": ("Loss in the energy storage", "#6c5b7b"),
     "recovered": ("Fed back to the supply", "#14805f"),
 }
 _RIVALS = {
-    "trapezoid": "Trapezoid of speed",
-    "quintic": "Smooth polynomial",
-    "ruckig": "Fastest motion",
-    "ruckig_slowed": "Fastest motion, slowed",
-    "straight": "Straight line in joints",
-    "controller_default": "Controller's default",
-    "waypoints": "Via points, with rests",
-    "blended": "Via points, rounded",
-    "even_speed": "Even speed along the path",
-    "stopping": "With a rest at every stop",
-    "move_by_move": "Each move by itself",
-    "same_factor": "All moves slowed alike",
+    "trapezoid": "Trapezoidal speed profile",
+    "quintic": "Quintic polynomial",
+    "ruckig": "Time-optimal motion",
+    "ruckig_slowed": "Time-optimal, slowed down",
+    "straight": "Straight line in joint space",
+    "controller_default": "Controller default",
+    "waypoints": "Via points with stops",
+    "blended": "Rounded via points",
+    "even_speed": "Constant speed on the path",
+    "stopping": "Rest at every stop",
+    "move_by_move": "Each move chosen alone",
+    "same_factor": "All moves scaled equally",
     "fastest_then_wait": "Fastest cycle, then a wait",
     "given_order": "Stops in the given order",
-    "without_storage": "Without the storage",
+    "without_storage": "Without energy storage",
 }
 LIMITS = {
-    "velocity": "speed",
+    "velocity": "joint speed",
     "acceleration": "acceleration",
     "jerk": "jerk",
     "torque": "torque",
-    "tcp_speed": "speed of the TCP",
-    "elbow_speed": "speed of the elbow",
+    "tcp_speed": "TCP speed",
+    "elbow_speed": "elbow speed",
 }
 
 
@@ -98,14 +98,14 @@ def their_energy(ours: float, saving: float) -> float:
 def saved(saving: float) -> str:
     """A saving in words."""
     if abs(saving) < REPORT.equal:
-        return "needs as much"
-    return f"saves {percent(saving)}" if saving > 0 else f"needs {percent(-saving)} less"
+        return "no saving"
+    return f"saving {percent(saving)}" if saving > 0 else f"needs {percent(-saving)} less"
 
 
 def above_least(subject: str, total: float, bound: float) -> str:
     """A sentence about the gap between an energy and its proven lower bound [J]."""
     if bound <= 0:
-        return "How little could be needed at least is not known here."
+        return "No positive lower bound is known for this task."
     return (
         f"{subject} needs less than {down(bound)} J, so this is at most "
         f"{percent(max(total / bound - 1, 0.0), 'up')} above the least possible."
@@ -133,17 +133,18 @@ def _in_joules(value: float, total: float) -> tuple[str, str]:
 
 
 def limits_used(worst_ratio: Mapping[str, float | None]) -> str:
-    """Use of the limits in words: limits used fully, and the shares of all others."""
+    """The largest use of every limit, as a sentence."""
     ratios = {
         name: value for name, value in worst_ratio.items() if name in LIMITS and value is not None
     }
     full = [LIMITS[name] for name, value in ratios.items() if value >= REPORT.fully]
     others = [
-        f"{LIMITS[name]} to {value:.0%}".replace("%", " %")
+        f"{LIMITS[name]} {100 * value:.0f} %"
         for name, value in ratios.items()
         if value < REPORT.fully
     ]
-    return ", ".join(([f"{listed(full)} used fully"] if full else []) + others)
+    used = ", ".join(([f"{listed(full)} fully"] if full else []) + others)
+    return f"Largest use of each limit: {used}."
 
 
 def listed(words: list[str]) -> str:

@@ -59,8 +59,8 @@ def test_it_agrees_with_itself_and_with_its_cycles_answered_anew(page: bytes) ->
     assert found.agrees, found.lines
     assert [line.what for line in found.lines][-3:] == [
         "page",
-        "cycle answered anew, best place",
-        "cycle answered anew, nominal place",
+        "cycle at the best place, answered again",
+        "cycle at the nominal place, answered again",
     ]
 
 
@@ -70,7 +70,7 @@ def test_what_was_changed_is_found(page: bytes) -> None:
     changed = replace(bundle, answer=bundle.answer | {"best": cheaper})
     file = page.replace(in_html(bundle.packed()).encode(), in_html(changed.packed()).encode())
     assert [line.what for line in checked(file, False, "test").lines if not line.agrees] == [
-        "sum of the cycles, best place",
+        "sum of the cycles at the best place",
         "page",
     ]
 
@@ -86,10 +86,11 @@ def test_a_nominal_place_that_fails_and_a_tolerance_are_told(page: bytes) -> Non
     report = report_of(
         replace(bundle, answer=answer | {"tolerance": tolerance, "lower_bound": None}, moves=rows)
     )
-    assert report.lead[0].endswith("At the nominal place there is none: a stop is out of reach.")
-    assert report.lead[1] == "How little could be needed at least is not known here."
-    assert "off by −12\u00a0mm to +30\u00a0mm in x, or +0° to +6° in yaw." in report.rivals_note
-    assert [each.name for each in report.rivals] == ["The best place", "The dearest of the map"]
+    assert report.lead[0].endswith("The nominal place has no cycle: a stop is out of reach.")
+    assert report.lead[1] == "No positive lower bound is known for this task."
+    offset = "an offset of −12\u00a0mm to +30\u00a0mm in x, or +0° to +6° in yaw."
+    assert offset in report.rivals_note
+    assert [each.name for each in report.rivals] == ["Best place", "Worst place of the map"]
 
 
 @pytest.mark.long
@@ -100,7 +101,7 @@ def test_several_cycles_count_by_their_weights(client: TestClient) -> None:
     bundle, text = attached_to(page), page.decode()
     weights = [row["weight"] for row in bundle.moves if row["place"] == "best"]
     assert weights == [3.0, 1.0]
-    assert "2 cycles, each as often as its weight, need" in text
+    assert "2 cycles, multiplied by their weights, need" in text
     assert f"<strong>{digits(bundle.answer['best']['energy'])}</strong> J" in text
     assert checked(page, False, "test").agrees
 
@@ -133,9 +134,9 @@ def test_the_map_shows_the_best_of_each_column_and_marks_the_others() -> None:
     # One height was not computed, so the column may be feasible.
     assert [each["reason"] for each in columns] == [None, None, None, "torque"]
     drawing = drawn_map(places, places[1], None)
-    assert drawing.count("<rect") == 2 + 7 and "left out" in drawing
+    assert drawing.count("<rect") == 2 + 7 and "not computed" in drawing
     assert "#00306f" in drawing and "#ffe945" in drawing
-    assert "too little torque" in drawing and "out of reach" not in drawing
+    assert "insufficient torque" in drawing and "out of reach" not in drawing
     assert "best place" in drawing and "nominal place" not in drawing
 
 

@@ -70,7 +70,7 @@ def test_a_job_is_summed_and_listed(page: bytes) -> None:
     totals = [answer["energy"]["electrical"]["total"] for answer in answers]
     bounds = sum(answer["energy"]["lower_bound"] for answer in answers)
     assert len(totals) == 3 and bounds <= sum(totals)
-    assert f"<b>{digits(sum(totals))}\u00a0J</b> together" in text and "<h1>Night run</h1>" in text
+    assert f"<b>{digits(sum(totals))}\u00a0J</b> in total" in text and "<h1>Night run</h1>" in text
     for name in ("bin to shelf", "shelf *&lt;to&gt;* bin"):
         assert f"<td>{name}</td>" in text
     assert "most energy: shelf ∗&lt;to&gt;∗ bin," in text, "the stars of a name mark nothing"
@@ -81,7 +81,7 @@ def test_a_job_is_summed_and_listed(page: bytes) -> None:
 
 
 def test_savings_of_a_job_are_those_of_its_moves(page: bytes) -> None:
-    """The savings sum up the nearest usual way of every move, and no other."""
+    """The savings sum up the best baseline of every move, and no other."""
     text, rows = page.decode(), attached_to(page).moves
     ours = theirs = 0.0
     for row in rows:
@@ -94,7 +94,7 @@ def test_savings_of_a_job_are_those_of_its_moves(page: bytes) -> None:
         own = answer["energy"]["electrical"]["total"]
         ours, theirs = ours + own, theirs + own / (1 - min(savings))
         assert f"<td>{percent(min(savings))}</td>" in text
-    assert ours, "some of these moves have a way within the limits"
+    assert ours, "some of these moves have a baseline within the limits"
     saving = 1 - ours / theirs
     assert (f"<b>{percent(saving)} less</b> than" in text) == (saving >= 0.0005)
 
@@ -116,7 +116,7 @@ def test_a_job_is_checked_row_by_row(page: bytes) -> None:
     assert found.agrees, found
     whats = [line.what for line in found.lines]
     assert whats[:4] == ["limits", "energy of no. 1", "energy of no. 2", "sum of the rows"]
-    assert whats[-3:] == [f"no. {k} answered anew" for k in (1, 2, 5)]
+    assert whats[-3:] == [f"no. {k} answered again" for k in (1, 2, 5)]
     bundle = attached_to(page)
     one = bundle.moves[0]["answer"]
     cheaper = one["energy"]["electrical"] | {"total": 0.9 * one["energy"]["electrical"]["total"]}
@@ -141,7 +141,7 @@ def test_a_log_is_measured_against_predicted(client: TestClient, log: str) -> No
     assert "<h1>morning</h1>" in text and len(answer["segments"]) == answer["segment_count"]
     found = measured(answer["total"])
     assert found is not None and found[0] == "electrical"
-    assert f"drew <b>{digits(found[1])}\u00a0J</b> by the logged power" in text
+    assert f"drew <b>{digits(found[1])}\u00a0J</b> according to the logged power" in text
     more = "more" if answer["total"]["difference"] >= 0 else "less"
     assert f"<b>{percent(abs(answer['total']['difference']))} {more}</b>" in text
     for part in answer["segments"]:
@@ -149,7 +149,7 @@ def test_a_log_is_measured_against_predicted(client: TestClient, log: str) -> No
         likely = part["energy"]["electrical"]["interval"]
         within = "yes" if likely["p5"] <= drawn <= likely["p95"] else "no"
         assert f"<td>{digits(drawn)}</td>" in text and f"<td>{within}</td>" in text
-    assert "What it costs" not in text and 'aria-label="The cell"' not in text
+    assert "Energy costs" not in text and 'aria-label="The cell"' not in text
 
 
 def test_a_report_of_a_log_holds_the_log(client: TestClient, log: str) -> None:
@@ -161,7 +161,7 @@ def test_a_report_of_a_log_holds_the_log(client: TestClient, log: str) -> None:
         found = checked(file, again=True, request_id="test")
         assert found.agrees, found
         whats = [line.what for line in found.lines]
-        assert {"predicted, anew", "measured by power, anew"} <= set(whats)
+        assert {"predicted, again", "measured from power, again"} <= set(whats)
     assert client.post("/report", json={"evaluate": {"log": log}}).status_code == 404
 
 
