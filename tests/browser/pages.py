@@ -120,8 +120,8 @@ def search_places(page: Page, half: int, seconds: int) -> None:
     for name in ("x", "y"):
         region.get_by_label(f"{name} from in mm").fill(f"-{half}")
         region.get_by_label(f"{name} to in mm").fill(f"{half}")
-    region.get_by_label("Distance of places").fill("100")
-    region.get_by_label("Time to search").fill(f"{seconds}")
+    region.get_by_label("Spacing of places").fill("100")
+    region.get_by_label("Search time").fill(f"{seconds}")
     page.locator("#search-places").click()
 
 

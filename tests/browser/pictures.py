@@ -99,7 +99,7 @@ def of_cells(page: Page) -> None:
     picture(page, "studio_stale")
     page.get_by_label("Name of the project").fill("Pick and place")
     ask(page, json.loads((ROOT / "examples" / "cycle" / "pick_and_place.json").read_text()))
-    page.get_by_role("button", name="Leave out").wait_for()
+    page.get_by_role("button", name="Omit").wait_for()
     expect(page.locator("#targets")).not_to_contain_text("checking")
     page.locator("#scrub").fill("2.4")
     page.mouse.move(0, 0)
@@ -132,7 +132,7 @@ def of_a_job(page: Page) -> None:
     page.locator("#job-readings").get_by_role("button", name="rad").click()
     page.locator("#start-job").click()
     page.locator("#job-progress", has_text=f"{len(MOVES)} of {len(MOVES)}").wait_for()
-    page.get_by_role("button", name="Intervals and savings").click()
+    page.get_by_role("button", name="Load intervals and savings").click()
     page.locator("#job-totals", has_text="less than").wait_for()
     picture(page, "studio_jobs")
 

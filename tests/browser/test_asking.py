@@ -60,7 +60,7 @@ def test_a_wrong_request_is_explained(page: Page) -> None:
     assert page.locator("#problem a").get_attribute("href") == "problems/invalid-request"
     for text in ("{", "3", '"x"', "null", "[]"):
         fill_json(page, text)
-        expect(page.locator("#json-error")).to_contain_text("no request")
+        expect(page.locator("#json-error")).to_contain_text("not a request")
         expect(page.locator("#optimise")).to_be_disabled()
     fill_json(page, FIRST)
     expect(page.locator("#json-error")).to_have_count(0)
@@ -125,7 +125,7 @@ def test_the_panel_keeps_every_example(page: Page) -> None:
     type_into(page, "/payload/mass", "1,5")
     assert state(page, "request")["payload"]["mass"] == 1.5
     type_into(page, "/payload/mass", "many")
-    expect(page.get_by_label("Tool and payload")).to_contain_text("No number")
+    expect(page.get_by_label("Tool and payload")).to_contain_text("Not a number")
     assert state(page, "request")["payload"]["mass"] == 1.5
     type_into(page, "/payload/mass", "0")
     assert "payload" not in state(page, "request")
@@ -134,7 +134,8 @@ def test_the_panel_keeps_every_example(page: Page) -> None:
 def test_a_goal_is_dragged_and_a_box_is_drawn(browser: Browser, service: Server) -> None:
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
-        page.get_by_role("toolbar", name="By hand").get_by_role("button", name="Drag").click()
+        tools = page.get_by_role("toolbar", name="Editing in the picture")
+        tools.get_by_role("button", name="Drag").click()
         page.locator("#drag").select_option("/goal")
         until(page, "() => studio.view.drag.handle.position.length() > 0")
         x, y = page.evaluate("""() => {
@@ -244,7 +245,7 @@ def test_a_page_stands_alone(browser: Browser, service: Server, tmp_path: Path) 
         until(page, SHOWN)
         page.locator("#export").click()
         with page.expect_download() as download:
-            page.get_by_role("button", name="Page that stands alone").click()
+            page.get_by_role("button", name="Stand-alone page").click()
         file = tmp_path / "motion.html"
         download.value.save_as(file)
         energy = page.locator("#joules").inner_text()

@@ -162,7 +162,7 @@ def test_what_a_log_does_not_tell_is_explained(page: Page, tmp_path: Path) -> No
 def test_measured_joules_stand_beside_those_that_are_predicted(
     page: Page, service: Server, tmp_path: Path
 ) -> None:
-    """Measured and predicted joules are shown for every move of a log and for the whole log."""
+    """Measured and predicted energies are shown for every move of a log and for the whole log."""
     file = tmp_path / "tuesday.csv"
     file.write_bytes(csv_of(recorded(ROBOT, TRUTH, moves=3, seed=5)))
     add_log(page, file)

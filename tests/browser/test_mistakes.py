@@ -101,7 +101,7 @@ def test_numbers_that_are_none_are_refused_at_their_cells(page: Page) -> None:
     type_into(page, "/payload/mass", "two")
     expect(cell).to_have_value("two")
     expect(cell).to_have_attribute("aria-invalid", "true")
-    expect(part_of(cell)).to_contain_text("No number")
+    expect(part_of(cell)).to_contain_text("Not a number")
     assert state(page, "request.payload.mass") == FIRST["payload"]["mass"]
     expect(page.locator("#optimise")).to_be_disabled()
     expect(page.locator("#run-state")).to_contain_text("Enter a number")
@@ -123,14 +123,14 @@ def test_prices_and_times_that_are_none_are_refused_where_they_stand(page: Page)
         price.press("Enter")
         expect(price).to_have_value(text)
         expect(price).to_have_attribute("aria-invalid", "true")
-        told = f"Enter a number of at least 0; until then {before} counts."
+        told = f"Enter a number of at least 0; until then, {before} is used."
         expect(page.locator("#assumptions .error")).to_have_text(told)
         assert state(page, "economics.price.value") == before
     price.fill("0,4")
     price.press("Enter")
     expect(page.locator("#assumptions .error")).to_have_count(0)
     assert state(page, "economics.price") == {"value": 0.4, "source": "yours"}
-    every = page.get_by_label("One move every so many seconds")
+    every = page.get_by_label("Time per move or cycle")
     every.fill("0")
     every.press("Enter")
     expect(part_of(every).locator(".error")).to_have_text("Enter a number above 0.")
@@ -150,13 +150,13 @@ def test_what_the_service_cannot_tell_is_said_where_it_is_missing(
         expect(page.locator("#tool option")).to_have_count(6)
         page.context.set_offline(True)
         page.locator("#tool").select_option(label="OnRobot RG2")
-        expect(part_of(page.locator("#tool"))).to_contain_text("figures of this gripper did not")
+        expect(part_of(page.locator("#tool"))).to_contain_text("this gripper could not be loaded")
         go(page, "Library")
         expect(page.locator("#library #problem")).to_contain_text("cannot be reached")
         for name in ("Answers", "Studies", "Your robots"):
             box = page.get_by_role("region", name=name)
             expect(box).to_be_visible()
-            expect(box.get_by_text("none")).to_have_count(0)
+            expect(box.get_by_text("yet")).to_have_count(0)
         page.context.set_offline(False)
         go(page, "Cell")
         type_into(page, "/payload/mass", "1.6")
@@ -186,10 +186,12 @@ def test_a_file_that_is_no_log_is_told_at_the_file(page: Page, tmp_path: Path) -
     file.write_text("a,b\n1,2\n")
     page.locator("#log-file").set_input_files(file)
     dialog = page.get_by_role("dialog")
-    dialog.get_by_label("Payload that it carried, kg").fill("two")
+    dialog.get_by_label("Payload, kg").fill("two")
     page.locator("#add-log").click()
-    expect(dialog.locator("[data-field=payload]")).to_have_text("Enter a number of kg, as 1.5.")
-    dialog.get_by_label("Payload that it carried, kg").fill("2")
+    expect(dialog.locator("[data-field=payload]")).to_have_text(
+        "Enter a mass in kg, for example 1.5."
+    )
+    dialog.get_by_label("Payload, kg").fill("2")
     page.locator("#add-log").click()
     expect(dialog.locator("[data-field=file]")).to_be_visible()
     expect(dialog.locator(".error")).to_have_count(1)

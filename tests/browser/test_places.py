@@ -138,7 +138,7 @@ def test_the_map_is_seen_and_its_best_place_is_looked_at(found: Page) -> None:
     solved = [each for each in answer["map"] if each["energy"] is not None]
     tiles = found.evaluate("() => studio.view.parts.places.children[0].count")
     assert tiles == len(solved) > 0
-    expect(found.locator("#best-place")).to_contain_text("where it stands now")
+    expect(found.locator("#best-place")).to_contain_text("current place")
 
 
 def test_a_click_on_the_map_computes_there(found: Page) -> None:
@@ -186,7 +186,7 @@ def test_an_accepted_place_is_one_step_of_undo(found: Page) -> None:
     assert state(found, "stale") is False and state(found, "run") is None
     assert state(found, "answered.solution.energy.electrical.total") == energy
     open_panel(found)
-    expect(found.locator("#map-stale")).to_contain_text("older than")
+    expect(found.locator("#map-stale")).to_contain_text("does not include")
     expect(found.locator("#place-legend")).to_have_count(0)
     found.locator("#undo").click()
     assert state(found, "request") == before and state(found, "stale") is False
@@ -228,7 +228,7 @@ def test_a_keyboard_is_enough(found: Page) -> None:
     found.keyboard.press("Control+a")
     found.keyboard.insert_text("50")
     expect(found.locator("#search-places")).to_be_disabled()
-    expect(found.locator("#region")).to_contain_text("0, where the robot stands now")
+    expect(found.locator("#region")).to_contain_text("The range of x must contain 0")
 
 
 def test_what_is_sent_is_what_the_library_says(browser: Browser, service: Server) -> None:

@@ -60,7 +60,7 @@ def test_figures_older_than_the_cell_are_marked(page: Page) -> None:
     until(page, "() => Boolean(window.studio?.state.answered)")
     expect(typed).to_have_value("500")
     expect(page.locator("#stale")).to_contain_text("Goal Z")
-    page.get_by_role("button", name="Undo it").click()
+    page.get_by_role("button", name="Undo change").click()
     expect(page.locator("#stale")).to_have_count(0)
 
 
@@ -102,21 +102,21 @@ def test_a_file_that_is_dropped_is_opened_or_refused(browser: Browser, service: 
     """The browser itself would leave the page for the file. What the file holds in other types than
     a project does not count.
     """
-    with opened(browser, f"{service.url}/studio", tolerated="is no project") as page:
+    with opened(browser, f"{service.url}/studio", tolerated="is not a project") as page:
         until(page, SHOWN)
         for name, text, why in (
             ("photo.png", "\x89PNG", "Save as a file"),
             ("answer.json", '{"robot": "ur5e", "trajectory": {}}', "It holds an answer"),
         ):
             assert page.evaluate(DROPPED, [name, text]) is False
-            expect(page.locator("#problem")).to_contain_text(f"{name} is no project")
+            expect(page.locator("#problem")).to_contain_text(f"{name} is not a project")
             expect(page.locator("#problem")).to_contain_text(why)
         assert state(page, "request") == FIRST
         old = {"name": 5, "request": FIRST, "typed": {"/payload/mass": 5}, "economics": {"box": 3}}
         assert page.evaluate(DROPPED, ["old.json", json.dumps(old)]) is False
         expect(page.get_by_label("Name of the project")).to_have_value("old")
         optimised(page)
-        expect(page.locator("#costs")).to_contain_text("€ a kWh")
+        expect(page.locator("#costs")).to_contain_text("€ per kWh")
 
 
 def test_a_kept_answer_comes_back_as_it_was_typed(browser: Browser, service: Server) -> None:
@@ -209,11 +209,11 @@ def test_a_part_of_known_size_needs_no_inertia(page: Page) -> None:
     expect(page.locator("#preview")).to_contain_text(f"set_target_payload(2.9, [{centre}])")
     expect(page.locator(".steps")).to_contain_text("2.90 kg (gripper and part)")
     page.keyboard.press("Escape")
-    page.get_by_role("radio", name="own", exact=True).click()
+    page.get_by_role("radio", name="own centre", exact=True).click()
     assert state(page, "request.payload.com") == tcp
     expect(page.locator("[data-pointer='/payload/com/2']")).to_have_value("142.0")
     page.get_by_label("Shape of the payload").select_option("none")
     type_into(page, "/payload/mass", "4.5")
-    expect(page.locator("#form")).to_contain_text("5.40 kg, gripper included, is more than")
+    expect(page.locator("#form")).to_contain_text("5.40 kg, gripper included, exceeds")
     type_into(page, "/payload/mass", "2")
     assert state(page, "request.payload") == {"mass": 2, "com": tcp, "shape": None}

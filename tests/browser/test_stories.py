@@ -85,12 +85,12 @@ def test_a_programmer_takes_a_program_to_the_controller(browser: Browser, servic
         optimised(page)
         answer = state(page, "answered.solution")
         assert answer["robot"] == "ur10e" and answer["arm"]["payload"]["mass"] == 4
-        page.get_by_label("One move every so many seconds").fill("6")
-        page.get_by_label("One move every so many seconds").blur()
-        expect(page.locator("#costs")).to_contain_text("Waiting, motors on")
+        page.get_by_label("Time per move or cycle").fill("6")
+        page.get_by_label("Time per move or cycle").blur()
+        expect(page.locator("#costs")).to_contain_text("Waiting with motors on")
         expect(page.locator("#costs thead")).to_contain_text("4,800×")
         notes = page.locator("#notes")
-        expect(notes).to_contain_text("a cycle is waiting")
+        expect(notes).to_contain_text("Waiting needs")
         expect(notes).to_contain_text(re.compile(r"brakes at rest, 0\.5 s .* J, .* % less"))
         expect(notes.get_by_role("button", name="Use brakes")).to_be_visible()
         page.locator("#export").click()
@@ -129,7 +129,7 @@ def test_a_programmer_makes_a_cycle_of_a_table(browser: Browser, service: Server
         assert page.evaluate(names) == "pick,rest,place"
         page.keyboard.press("Control+Shift+z")
         page.locator("[data-row='/stops/0/target'] input").nth(1).focus()
-        page.get_by_role("radio", name="takes").click()
+        page.get_by_role("radio", name="picks up").click()
         type_into(page, "/stops/0/payload/mass", "2")
         page.locator(".payload-form > summary").click()
         page.get_by_label("Shape of the payload").select_option("box")
@@ -152,8 +152,8 @@ def test_a_programmer_makes_a_cycle_of_a_table(browser: Browser, service: Server
             for leg in legs
             if leg["kind"] == "move" and "start" in (leg["start"]["stop"], leg["goal"]["stop"])
         )
-        expect(page.locator("#notes")).to_contain_text(f"start and back to it take {home:.3g} of")
-        expect(page.get_by_role("button", name="Leave out")).to_be_visible()
+        expect(page.locator("#notes")).to_contain_text(f"from and to the start need {home:.3g} of")
+        expect(page.get_by_role("button", name="Omit")).to_be_visible()
         page.locator("#export").click()
         page.locator("[data-format=movej]").click()
         page.get_by_label("Gripper output").select_option("0")
@@ -263,7 +263,7 @@ def test_an_engineer_takes_a_table_of_moves_overnight(
         page.locator("#start-job").click()
         expect(page.locator("#job-progress")).to_have_text("3 of 3 moves")
         expect(page.locator("#moves tbody tr.failed")).to_contain_text("out of reach")
-        page.get_by_role("button", name="Intervals and savings").click()
+        page.get_by_role("button", name="Load intervals and savings").click()
         for row in page.locator("#moves tbody tr").all()[:2]:
             expect(row).to_contain_text(" to ")
         with page.expect_download() as download:
@@ -280,7 +280,9 @@ def test_an_engineer_takes_a_table_of_moves_overnight(
         assert "<td>bin to shelf</td>" in text and "1 of 3 moves has no answer" in text
         assert f"<strong>{digits(sum(joules))}</strong> J" in text
         assert report(page, "pdf").startswith(b"%PDF")
-        page.locator("#moves tbody tr.failed").get_by_role("button", name="Open in cell").click()
+        page.locator("#moves tbody tr.failed").get_by_role(
+            "button", name="Open in the cell"
+        ).click()
         until(page, "() => studio.state.page === 'cell' && Boolean(studio.state.trouble)")
         expect(page.locator("[data-row='/goal']")).to_contain_text("out of reach")
     # A viewer elsewhere sees the names and the requested moves.
@@ -303,7 +305,7 @@ def test_an_engineer_reports_to_those_who_decide(page: Page) -> None:
     page.locator("#costs").get_by_role("button", name="Assumptions").click()
     page.get_by_label("Electricity in € per kWh").fill("0.31")
     page.get_by_label("Electricity in € per kWh").blur()
-    expect(page.locator("#costs")).to_contain_text("0.31 € a kWh (yours)")
+    expect(page.locator("#costs")).to_contain_text("0.31 € per kWh (yours)")
     joules = page.locator("#joules").inner_text().split()[0]
     text = report(page, "html").decode()
     assert joules in text and "0.31" in text and "EEA" in text
@@ -328,13 +330,13 @@ def test_an_engineer_compares_a_log_with_what_was_predicted(
         measured = float(whole.nth(2).inner_text().replace(",", ""))
         page_of_log = report(page, "html")
         assert "<h1>monday.csv</h1>" in page_of_log.decode()
-        expect(page.locator("#logs")).not_to_contain_text("This log is of")
+        expect(page.locator("#logs")).not_to_contain_text("This log is from")
         go(page, "Cell")
         page.locator("#change-robot").click()
         page.get_by_label("Search robots").fill("ur10e")
         page.get_by_role("option", name="Universal Robots UR10e").click()
         go(page, "Logs")
-        expect(page.locator("#logs")).to_contain_text("This log is of a Universal Robots UR5e")
+        expect(page.locator("#logs")).to_contain_text("This log is from a Universal Robots UR5e")
         drawn = attached_to(page_of_log).answer["total"]["measured"]["electrical"]
         assert measured == pytest.approx(drawn, rel=0.01)
         assert checked(page_of_log, True, "test").agrees

@@ -16,9 +16,9 @@ const change: Change = {
 const way = (energy: number, duration = 1) => ({ energy, duration });
 
 it("every change says its joules", () => {
-  expect(wordsOf(change)).toBe("A cycle from the last stop: 607 J in 11.4 s, 20 % less.");
+  expect(wordsOf(change)).toBe("Omit the start position: 607 J in 11.4 s, 20 % less.");
   expect(wordsOf({ ...change, name: "brakes", share: 0.0533 })).toMatch(
-    /stands: 607 J, 5.3 % less/,
+    /at rest: 607 J, 5.3 % less/,
   );
 });
 

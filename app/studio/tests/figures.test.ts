@@ -75,9 +75,9 @@ it("joint positions of the service are told in degrees", () => {
   );
 });
 
-it("usual ways and their faults are named in the words of the panel", () => {
+it("baselines and their faults are named in the words of the panel", () => {
   expect([baselineName("quintic"), baselineName("quintic", true)]).toEqual([
-    "Quintic in joints",
+    "Quintic polynomial",
     "Quintic along the path",
   ]);
   expect(plain("`controller_default` is left out.")).toBe("“Controller default” is left out.");
@@ -150,7 +150,7 @@ it("targets in rows are moves from each to the next", () => {
 it("rows that do not fit are named", () => {
   expect(parseMoves("1;2;3", 6)).toHaveProperty("why");
   expect(parseMoves(`${HEAD}\n${Array(12).fill(1).join(";")}\n1;2`, 6)).toEqual({
-    why: "Row 2 has 2 numbers, the first one 11.",
+    why: "Row 2 has 2 numbers, but row 1 has 11.",
   });
 });
 
@@ -181,7 +181,7 @@ it("what the service says has the units and the names of the page", () => {
   ];
   tell(new Problem({ title: "Invalid request", detail: "See `errors`.", errors }), MOVE);
   expect(trouble.value).toMatchObject({
-    text: "Correct what is marked.",
+    text: "Correct the marked fields.",
     fields: [
       { pointer: "/goal/pose/position/0", text: "At most 100 (in SI units, not mm)" },
       { pointer: "/payload/mass", text: "Too heavy" },
@@ -219,7 +219,9 @@ it("a mass of a table that is no number is named, and not left out", () => {
     `from;to;kg;x mm;y;z;rx rad;ry;rz;x;y;z;rx;ry;rz\na;b;-2;${six};${six}`,
     `a;b;NaN;${six};${six}`,
   ])
-    expect(parseMoves(text, 6)).toMatchObject({ why: expect.stringMatching(/Row 1: .*no mass/) });
+    expect(parseMoves(text, 6)).toMatchObject({
+      why: expect.stringMatching(/Row 1: .*not a mass/),
+    });
   const read = parseMoves(`from;to;kg;x;y;z;rx;ry;rz;x;y;z;rx;ry;rz\na;b;;${six};${six}`, 6);
   expect(read).toMatchObject({ moves: [{ from: "a", to: "b", mass: 0 }] });
 });

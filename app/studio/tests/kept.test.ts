@@ -68,7 +68,7 @@ it("a tab without changes does not overwrite what another tab has saved", async 
   write("/payload/mass", 2, "2");
   await saveNow();
   await vi.waitFor(async () => expect(await kept()).toEqual({ tabs: 3, "tabs 2": 2 }), 3000);
-  expect(toast.value).toContain("this one is tabs 2 now");
+  expect(toast.value).toContain("your version is now tabs 2");
   for (const { id } of await projects()) await deleteProject(id);
 });
 
@@ -124,7 +124,7 @@ it("a link brings the whole cell back", async () => {
   const address = await link(presentCell(), "http://cell/studio");
   expect((await shared(new URL(address).hash)).cell).toEqual(presentCell());
   await expect(shared(new URL(address.slice(0, -20)).hash)).rejects.toThrow(
-    "A part of it is missing",
+    "A part of the link is missing",
   );
   expect(await shared("#answer=x")).toEqual({ answer: "x" });
   expect(await shared("")).toEqual({});
@@ -163,8 +163,8 @@ it("a file of another program or version is opened as far as it holds a project"
 });
 
 it.each([
-  [{ hello: "world" }, "neither targets nor a robot"],
-  [{ request: [1] }, "neither targets nor a robot"],
+  [{ hello: "world" }, "Neither targets nor a robot"],
+  [{ request: [1] }, "Neither targets nor a robot"],
   [{ robot: "ur5e", trajectory: { t: [] } }, "an answer"],
   [{ robot: "ur5e", legs: [] }, "an answer"],
 ])("a file that holds no request is refused: %o", (held, why) => {

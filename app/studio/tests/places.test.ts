@@ -126,11 +126,11 @@ describe("what is sent", () => {
     });
   });
   it.each([
-    [{ x: ["", "200"] as [string, string] }, "Enter two numbers: x"],
-    [{ x: ["50", "200"] as [string, string] }, "x: 0, where"],
+    [{ x: ["", "200"] as [string, string] }, "Enter two numbers for x"],
+    [{ x: ["50", "200"] as [string, string] }, "The range of x must contain 0"],
     [{ free: { x: false, y: false, z: false, yaw: false } }, "Tick what may change"],
-    [{ deadline: "soon" }, "Enter the seconds"],
-    [{ step: "0" }, "Enter the distance"],
+    [{ deadline: "soon" }, "Enter the search time"],
+    [{ step: "0" }, "Enter the spacing"],
   ])("or says what is wrong with %o", (wrong, why) => {
     expect((regionOf({ ...given, ...wrong }, 0) as { why: string }).why).toContain(why);
   });

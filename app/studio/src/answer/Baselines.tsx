@@ -7,13 +7,13 @@ import { figure, percent } from "../store/units";
 import { baselineName, energyOf, nounOf } from "../store/facts";
 import { advised } from "./advice";
 
-const FEW = 1; // of those that break a limit, which are shown at once
+const FEW = 1; // baselines that exceed a limit, which are shown at once
 const EQUAL = 0.0005; // greatest saving that is none
 const WAITS = 1.01; // ratio of the longer time to the shorter above which the wait is worth a word
 const differ = (one: number, two: number) => Math.max(one, two) > WAITS * Math.min(one, two);
 
 /**
- * The same task in the usual ways. A saving is claimed only against those that keep every limit.
+ * The baselines of the answer. A saving is claimed only against those that keep every limit.
  */
 export function Baselines() {
   const shown = answered.value;
@@ -36,14 +36,14 @@ export function Baselines() {
     </tr>
   );
   return (
-    <Section title="Against the usual ways" id="baselines">
+    <Section title="Comparison with baselines" id="baselines">
       <table class={stale.value ? "stale" : undefined}>
         <thead>
           <tr>
             <td />
             <th scope="col">time</th>
-            <th scope="col">J a {nounOf(shown)}</th>
-            <th scope="col">{advised.value?.waiting ? "saves of a cycle" : "saves"}</th>
+            <th scope="col">J per {nounOf(shown)}</th>
+            <th scope="col">{advised.value?.waiting ? "saving per cycle" : "saving"}</th>
           </tr>
         </thead>
         <tbody>
@@ -54,19 +54,16 @@ export function Baselines() {
       </table>
       {kept.some(({ duration }) => differ(duration, shown.solution.duration)) && (
         <p class="hint">
-          Compared in the longer of both times: whatever ends first waits until then, motors on.
+          If the durations differ, the faster motion waits with its motors on, and its energy
+          includes the wait.
           {kept.some(({ saving }) => saving !== null && saving <= -EQUAL) &&
-            " Where a slower way needs less, ask for exactly its time: the motion is then optimised for it."}
+            " If a slower baseline needs less, request exactly its duration."}
         </p>
       )}
-      {!kept.length && (
-        <p class="hint">
-          No usual way that was computed keeps every limit, so no saving is claimed.
-        </p>
-      )}
+      {!kept.length && <p class="hint">No baseline keeps every limit, so no saving is claimed.</p>}
       {broken.length > 0 && (
         <p class="hint">
-          Hatched: breaks a limit, so no saving is claimed.{" "}
+          Hatched baselines exceed a limit, so no saving is claimed.{" "}
           {first.filter(reasonOf).map((each) => (
             <span class="reason" key={each.name}>
               {nameOf(each.name)}: {reasonOf(each)}.{" "}
@@ -83,7 +80,7 @@ export function Baselines() {
   );
 }
 
-/** What a way breaks, in words; of a cycle, each limit once, with the moves that break it. */
+/** The limits that a baseline exceeds; for a cycle, each limit once, with the moves that exceed it. */
 export function reasonOf({ reason, broken = [] }: Baseline): string {
   if (reason) return reason;
   const moves = new Map<string, string[]>();
@@ -132,7 +129,7 @@ function Saving({ of: way }: { of: Baseline }) {
   const saving = ofCycle(own, ours, theirs, waiting);
   const interval = waiting ? null : known;
   const likely = interval
-    ? `likely ${percent(interval.p5)} to ${percent(interval.p95)}`
+    ? `90 % interval ${percent(interval.p5)} to ${percent(interval.p95)}`
     : undefined;
   if (saving >= EQUAL)
     return (
@@ -141,8 +138,6 @@ function Saving({ of: way }: { of: Baseline }) {
       </b>
     );
   return (
-    <span title={likely}>
-      {saving > -EQUAL ? "needs as much" : `needs ${percent(-saving)} less`}
-    </span>
+    <span title={likely}>{saving > -EQUAL ? "no saving" : `needs ${percent(-saving)} less`}</span>
   );
 }

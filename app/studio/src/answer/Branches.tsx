@@ -26,12 +26,12 @@ export function Branches() {
   return (
     <details class="section fold" id="branches">
       <summary>
-        <b>Branches of the search</b>{" "}
+        <b>Candidates of the search</b>{" "}
         <small>{counts.map(([status, count]) => `${count} ${status}`).join(", ")}</small>
       </summary>
       <p class="hint">
-        A branch is a posture at both ends; the same one with a joint a full turn further is a
-        branch of its own. Pruned: ruled out before it was solved.
+        A candidate is a pair of start and goal configurations; full-turn alternatives of a joint
+        are separate candidates. Pruned: ruled out without a solution.
       </p>
       <div class="row">
         <select
@@ -46,12 +46,12 @@ export function Branches() {
         </select>
         {candidates.length < total && shown.asked && (
           <Button small onClick={trying(() => optimise({ ...shown.asked, candidates: "all" }))}>
-            List all {total} (computes again)
+            Compute again to list all {total}
           </Button>
         )}
       </div>
       <Table
-        label="Branches"
+        label="Candidates"
         head={["goal", "status", "bound J", "energy J", "time s", ""]}
         rows={rows.slice(0, MOST_ROWS).map((each, k) => ({
           key: k,
@@ -81,7 +81,11 @@ function cellsOf(each: Candidate, { branch }: Solution) {
     (ghosts.value = seen
       ? ghosts.value.filter(({ q }) => q !== each.q_goal)
       : [...ghosts.value, { q: each.q_goal, colour: 0x4477aa }].slice(-4));
-  const status = best ? "this motion" : each.refined === false ? "solved roughly" : each.status;
+  const status = best
+    ? "this motion"
+    : each.refined === false
+      ? "solved, not refined"
+      : each.status;
   const acts = best ? (
     ""
   ) : (

@@ -19,11 +19,11 @@ export function Certificate() {
         </p>
       )}
       <p class="hint">
-        The goal is met within {figure(error.position * 1000, 2)} mm and {figure(error.rotation, 2)}{" "}
-        rad. A second program, apart from the solver, replayed the motion.{" "}
+        The goal is reached within {figure(error.position * 1000, 2)} mm and{" "}
+        {figure(error.rotation, 2)} rad. Pinocchio replayed the motion, independently of the solver.{" "}
         {shown.solution.id && (
           <>
-            Kept as <code>{shown.solution.id.slice(0, 8)}</code>.
+            Stored as <code>{shown.solution.id.slice(0, 8)}</code>.
           </>
         )}
       </p>

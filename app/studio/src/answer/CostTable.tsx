@@ -16,11 +16,11 @@ function partsOf(shown: Answered): { name: string; joules: number }[] {
     ? [
         { name: "Moves", joules: total - dwell },
         { name: "At the stops", joules: dwell },
-        { name: "Waiting, motors on", joules: waiting },
+        { name: "Waiting with motors on", joules: waiting },
       ]
     : [
-        { name: "The move", joules: total - dwell },
-        { name: "Waiting, motors on", joules: dwell || waiting },
+        { name: "Move", joules: total - dwell },
+        { name: "Waiting with motors on", joules: dwell || waiting },
       ];
   return parts.filter(({ joules }, k) => k === 0 || joules > 0);
 }
@@ -36,7 +36,7 @@ export function CostTable() {
   const kwh = (value: number) => `${figure(value)} kWh`;
   return (
     <Section
-      title="What it costs"
+      title="Energy costs"
       id="costs"
       action={
         <Button kind="link" onClick={() => setOpen(!open)}>
@@ -70,14 +70,14 @@ export function CostTable() {
           ))}
           {costs.rows.length > 1 && (
             <tr class="total">
-              <th scope="row">Together</th>
+              <th scope="row">Total</th>
               <td>{figure(costs.total.joules)} J</td>
               <td>{kwh(costs.total.shift)}</td>
               <td>{kwh(costs.total.year)}</td>
             </tr>
           )}
           <tr class="sub">
-            <th scope="row">Money, CO₂e</th>
+            <th scope="row">Cost, CO₂e</th>
             <td />
             <td>
               {figure(costs.money.shift, 2)} €, {figure(costs.carbon.shift, 2)} kg
@@ -90,23 +90,23 @@ export function CostTable() {
       </table>
       <p class="hint">
         <span title={given.price.source}>
-          {fixed(given.price.value, 2)} € a kWh ({short(given.price)})
+          {fixed(given.price.value, 2)} € per kWh ({short(given.price)})
         </span>
         ,{" "}
         <span title={given.carbon.source}>
-          {fixed(given.carbon.value, 2)} kg CO₂e a kWh ({short(given.carbon)})
+          {fixed(given.carbon.value, 2)} kg CO₂e per kWh ({short(given.carbon)})
         </span>
-        . {given.box ? "" : "The control box itself is not counted: enter a wattmeter’s reading. "}
+        . {given.box ? "" : "The control box is not included: enter its measured power. "}
         {given.cycleTime === null && !shown.cycle && !shown.asked?.dwell
-          ? "Back to back: say how often the move comes to price the wait."
+          ? "The moves follow each other without pause: enter a cycle time to include a wait. "
           : ""}
         {given.cycleTime !== null && given.cycleTime < shown.solution.duration
-          ? `This ${nounOf(shown)} takes longer than ${figure(given.cycleTime)} s. `
+          ? `This ${nounOf(shown)} takes longer than the cycle time of ${figure(given.cycleTime)} s. `
           : ""}
         {unpriced
           ? adviceFailed.value
-            ? "The wait could not be computed."
-            : "The wait is being priced."
+            ? "The energy of the wait could not be computed."
+            : "The energy of the wait is being computed."
           : ""}
       </p>
       {open && <Assumptions />}
@@ -122,7 +122,7 @@ const LETTERS: Record<string, string> = { C: "second-hand" };
 const sourceOf = ({ source, letter }: Sourced) =>
   letter ? `${letter}, ${LETTERS[letter] ?? ""}: ${source}` : source;
 
-/** What the costs rest on; each is replaced by the user's own. */
+/** The assumptions behind the costs; users replace them by their own. */
 function Assumptions() {
   const given = economics.value;
   const set = (next: Partial<Economics>) => (economics.value = { ...given, ...next });
@@ -172,23 +172,23 @@ function Assumptions() {
         (value) => value !== null && set({ shift: value }),
       )}
       {row(
-        "Shifts a year",
+        "Shifts per year",
         "shifts",
         given.shiftsPerYear,
         given.shiftsPerYear === DEFAULT_ECONOMICS.shiftsPerYear
-          ? "assumed: two on 230 days"
+          ? "assumed: two shifts on 230 days"
           : "yours",
         (value) => value !== null && set({ shiftsPerYear: value }),
       )}
       {row(
-        "Control box at the mains",
+        "Control box",
         "W",
         given.box?.value ?? null,
         given.box
           ? "yours"
-          : "a wattmeter’s reading while the arm stands, less the arm’s own power",
+          : "power from the mains while the arm is at rest, minus the arm’s own power",
         (value) => set({ box: value === null ? null : yours(value) }),
-        "not counted",
+        "not included",
       )}
     </div>
   );

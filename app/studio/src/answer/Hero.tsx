@@ -4,7 +4,7 @@ import { atMost, figure } from "../store/units";
 import { brokenLimit, capital, energyOf, gapOf, nounOf } from "../store/facts";
 import { Parts } from "./Parts";
 
-/** The energy with its interval, and what it rests on. */
+/** The energy with its interval and its assumptions. */
 export function Hero() {
   const shown = answered.value;
   if (!shown) return null;
@@ -28,12 +28,12 @@ export function Hero() {
           {broken ? (
             <span class="chip bad">
               <Icon name="alert" />
-              Breaks a limit: {broken}
+              Limit violated: {broken}
             </span>
           ) : (
             <span class="chip good">
               <Icon name="circleCheck" />
-              Keeps every limit
+              Keeps all limits
             </span>
           )}
           <Interval shown={shown} />
@@ -45,11 +45,11 @@ export function Hero() {
           <dd>{figure(solution.duration)} s</dd>
         </div>
         <div>
-          <dt>mean</dt>
+          <dt>mean power</dt>
           <dd>{figure(solution.energy.mean_power, 2)} W</dd>
         </div>
         <div>
-          <dt>peak</dt>
+          <dt>peak power</dt>
           <dd>{figure(solution.energy.peak_power)} W</dd>
         </div>
         <div>
@@ -64,11 +64,13 @@ export function Hero() {
           .map(([letter, text]) => `${letter}: ${text}`)
           .join("\n")}
       >
-        {shown.asked?.figures ? "Computed with figures of your own arm." : shown.robot.energy_trust}
+        {shown.asked?.figures
+          ? "Computed with identified figures of your arm."
+          : shown.robot.energy_trust}
       </p>
       {solution.status !== "optimal" && (
         <p class="warning-text">
-          {capital(solution.status)}: the search ended before every posture was ruled out.
+          {capital(solution.status)}: the search ended before every other candidate was ruled out.
         </p>
       )}
     </section>
@@ -93,7 +95,7 @@ function Interval({ shown }: { shown: Answered }) {
         <i class="best" style={{ left: place(total) }} />
       </div>
       <p class="hint" id="likely">
-        likely {figure(p5, 2)} to {figure(p95, 2)} J
+        90 % interval {figure(p5, 2)} to {figure(p95, 2)} J
       </p>
     </>
   );

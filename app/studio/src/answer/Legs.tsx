@@ -20,7 +20,7 @@ export function Legs() {
   if (!cycle) return null;
   const now = legAt(cycle.legs, time.value);
   return (
-    <Section title="Legs" note="gap: at most so much above the least" id="legs">
+    <Section title="Legs" note="gap: energy above the lower bound" id="legs">
       <table class={stale.value ? "stale" : undefined}>
         <thead>
           <tr>

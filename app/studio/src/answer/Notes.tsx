@@ -9,7 +9,7 @@ import { figure } from "../store/units";
 import { plain } from "../store/facts";
 import { advised, CHANGES, wordsOf, type Change } from "./advice";
 
-const LEAST = 0.05; // share of a cycle below which its way home is no matter
+const LEAST = 0.05; // share of a cycle below which its moves from and to the start do not matter
 const MOST = 3;
 const SPARE = 0.002; // clearance beyond the margins that is worth a note [m]
 
@@ -39,7 +39,7 @@ export function Notes() {
   );
 }
 
-/** What was computed on the wait, the way home, and changes of the task: the largest first. */
+/** The wait, the moves from and to the start, and changes of the task: the largest first. */
 function adviceNotes(): JSX.Element[] {
   const now = advised.value;
   const shown = answered.value;
@@ -53,14 +53,14 @@ function adviceNotes(): JSX.Element[] {
   if (without || (now.home ?? 0) > LEAST * now.energy)
     notes.unshift(
       <Advice key="home" change={without}>
-        The moves from the start and back to it take {figure(now.home)} of{" "}
+        The moves from and to the start need {figure(now.home)} of{" "}
         {figure(shown.solution.energy.electrical.total)} J.
       </Advice>,
     );
   if (now.waiting)
     notes.unshift(
       <Advice key="wait" change={whole}>
-        {figure(now.waiting)} of {figure(now.energy)} J a cycle is waiting.
+        Waiting needs {figure(now.waiting)} of {figure(now.energy)} J per cycle.
       </Advice>,
     );
   return notes;
@@ -105,8 +105,8 @@ function Close({ shown }: { shown: Answered }) {
         </Button>
       }
     >
-      {clearance.pair.join(" and ")} pass {figure(distance * 1000, 2)} mm apart,{" "}
-      {figure(clearance.min_clearance * 1000, 2)} mm to spare.
+      {clearance.pair.join(" and ")} pass at a distance of {figure(distance * 1000, 2)} mm,{" "}
+      {figure(clearance.min_clearance * 1000, 2)} mm more than required.
     </Note>
   );
 }

@@ -8,15 +8,15 @@ const PARTS: Record<string, [string, string]> = {
   inverter: ["inverters", "Loss in the inverters."],
   potential: ["lifting", "Gain of potential energy from start to goal; negative on the way down."],
   kinetic: ["kinetic", "Gain of kinetic energy; zero from standstill to standstill."],
-  braking: ["braking", "Regenerated energy that no joint uses and no storage takes."],
-  recovered: ["given back", "The part of braking that the supply takes back."],
+  braking: ["brake resistor", "Regenerated energy that no joint uses and no storage takes."],
+  recovered: ["fed back", "The part of braking that the supply takes back."],
   storage_loss: ["storage", "Loss in the energy storage on the bus."],
-  dwell: ["stops and waits", "Energy drawn while the arm stands."],
+  dwell: ["waiting", "Energy drawn while the arm is at rest."],
 };
 const LEAST = 5e-3; // parts below this share of the total are not listed
 
 /**
- * Where the energy goes: one stacked bar, and the list of its parts. What is given back stands left
+ * Where the energy goes: one stacked bar, and the list of its parts. Energy that is fed back is left
  * of the line.
  */
 export function Parts({ electrical }: { electrical: Electrical }) {

@@ -13,7 +13,7 @@ const MOST = 3; // arms beside that of the answer
 const degrees = (q: number[]) => q.map((value) => fixed((value * 180) / Math.PI, 0));
 
 /**
- * Ways to stand at the goal, with joints as the pendant shows them and the energy of the way there.
+ * Postures at the goal, with joints as the pendant shows them and the energy of the motion there.
  */
 export function Postures() {
   const shown = answered.value;
@@ -25,7 +25,7 @@ export function Postures() {
       .map(({ letter, q, energy }) => [letter, ...degrees(q), figure(energy)].join("\t"))
       .join("\n");
     navigator.clipboard?.writeText(text).then(
-      () => (toast.value = "The joints are copied, in degrees."),
+      () => (toast.value = "The joint positions are copied in degrees."),
       () => undefined,
     );
   };
@@ -63,9 +63,9 @@ export function Postures() {
         </table>
       </div>
       <p class="hint">
-        {best!.letter}: {postureWords(best!.label)}. Each from the start that suits it best.
+        {best!.letter}: {postureWords(best!.label)}. Every motion begins at its best start.
         {collide > 0 &&
-          ` ${collide} of ${all.length} ${collide === 1 ? "collides" : "collide"} at the goal.`}
+          ` ${collide} of ${all.length} postures ${collide === 1 ? "collides" : "collide"} at the goal.`}
       </p>
     </Section>
   );

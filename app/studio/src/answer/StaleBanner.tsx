@@ -14,7 +14,7 @@ export function StaleBanner() {
   return (
     <div class="stale-banner" id="stale" role="status">
       <p>
-        <Icon name="alert" /> <b>These figures are older than your changes</b>
+        <Icon name="alert" /> <b>These results do not include your changes</b>
       </p>
       <ul>
         {all.slice(0, MOST).map(({ pointer, name, before, after }) => (
@@ -33,7 +33,7 @@ export function StaleBanner() {
         >
           Optimise again
         </Button>
-        <Button onClick={revert}>{all.length === 1 ? "Undo it" : "Undo all"}</Button>
+        <Button onClick={revert}>{all.length === 1 ? "Undo change" : "Undo all changes"}</Button>
       </div>
     </div>
   );

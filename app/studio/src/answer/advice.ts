@@ -36,11 +36,11 @@ export const adviceFailed = signal(false);
 
 /** What a change is, and the button that makes it. */
 export const CHANGES: Record<Change["name"], { text: string; button: string }> = {
-  whole_cycle: { text: "Over the whole cycle time", button: "Use the cycle time" },
-  brakes: { text: "With brakes at rest, 0.5 s after it stands", button: "Use brakes" },
-  without_home: { text: "A cycle from the last stop", button: "Leave out" },
-  shorter_stops: { text: "With every stop 0.1 s shorter", button: "Shorten" },
-  lighter_tool: { text: "With a tool of half the mass", button: "" },
+  whole_cycle: { text: "Use the whole cycle time", button: "Use the cycle time" },
+  brakes: { text: "Brakes after 0.5 s at rest", button: "Use brakes" },
+  without_home: { text: "Omit the start position", button: "Omit" },
+  shorter_stops: { text: "Dwells 0.1 s shorter", button: "Shorten" },
+  lighter_tool: { text: "Tool of half the mass", button: "" },
 };
 
 /** A change with its joules. */

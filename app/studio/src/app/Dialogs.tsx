@@ -27,7 +27,7 @@ export function Dialogs() {
         ))}
       {dialog.value === "projects" && <ProjectsDialog onClose={close} />}
       {dialog.value === "keys" && (
-        <Dialog title="Keys" onClose={close}>
+        <Dialog title="Keyboard shortcuts" onClose={close}>
           <dl class="keys">
             {KEYS.map(([keys, effect]) => (
               <div key={keys}>
@@ -53,7 +53,7 @@ function KeyDialog() {
       onClose={() => give(null)}
       footer={
         <Button kind="primary" onClick={() => give(key.trim() || null)}>
-          Use it
+          Use key
         </Button>
       }
     >
@@ -68,7 +68,7 @@ function KeyDialog() {
           onKeyDown={(event) => event.key === "Enter" && give(key.trim() || null)}
         />
       </label>
-      <p class="hint">It is kept until this tab is closed.</p>
+      <p class="hint">The key is kept until this tab is closed.</p>
     </Dialog>
   );
 }

@@ -79,7 +79,7 @@ export function ProjectMenu() {
           </select>
         </label>
         <Button kind="quiet" onClick={() => (dialog.value = "keys")}>
-          Keys …
+          Keyboard shortcuts …
         </Button>
       </Menu>
     </>

@@ -50,7 +50,7 @@ export function ProjectsDialog({ onClose }: { onClose: () => void }) {
         value={filter}
         onInput={(event) => setFilter(event.currentTarget.value)}
       />
-      {all && !shown.length && <p class="hint">None.</p>}
+      {all && !shown.length && <p class="hint">No project found.</p>}
       <ul class="kept">
         {shown.map((each) => (
           <KeptRow

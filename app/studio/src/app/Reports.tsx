@@ -30,7 +30,7 @@ function Card({ report }: { report: Report }) {
     <article class="report-card" data-state={state}>
       <p role={state === "failed" ? "alert" : "status"}>
         {state === "writing" && `The report on ${title} is being written.`}
-        {state === "saved" && `${name} is saved, with request and answer attached.`}
+        {state === "saved" && `${name} is saved, with the request and the answer attached.`}
         {state === "failed" && `The report on ${title} was not written: ${why}`}
       </p>
       {state === "writing" && (

@@ -31,8 +31,8 @@ const SAVED = {
   "": "",
   saving: "Saving …",
   saved: "Saved in this browser",
-  elsewhere: "Changed in another tab: reload",
-  failed: "Not saved: this browser keeps nothing",
+  elsewhere: "Changed in another tab: reload the page",
+  failed: "Not saved: this browser stores no data",
 };
 
 /** Puts the cell into the address of the page, and the address into the clipboard. */
@@ -41,9 +41,9 @@ async function share(): Promise<void> {
   history.replaceState(history.state, "", address);
   try {
     await navigator.clipboard.writeText(address);
-    toast.value = "The link is copied. It is the address of this page now.";
+    toast.value = "The link is copied, and is now the address of this page.";
   } catch {
-    toast.value = "The address of this page is the link now: copy it.";
+    toast.value = "The link is now the address of this page: copy the address.";
   }
 }
 

@@ -40,8 +40,8 @@ export async function readFile(file: File): Promise<void> {
   } catch (error) {
     const why = text.trimStart().startsWith("{")
       ? (error as Error).message
-      : "choose a file that “Save as a file” wrote, or a request in JSON.";
-    tell(new Error(`${file.name} is no project: ${why}`));
+      : "Choose a file saved by “Save as a file”, or a request in JSON.";
+    tell(new Error(`${file.name} is not a project. ${why}`));
   }
 }
 

@@ -46,7 +46,7 @@ export function Front() {
   if (!known)
     return (
       <div class="chart-empty">
-        <p class="hint">How much a slower or faster motion would need.</p>
+        <p class="hint">The least energy of slower and faster motions.</p>
         <Button
           id="compute-front"
           disabled={!shown.asked || stale.value || Boolean(run.value)}
@@ -122,7 +122,8 @@ function Drawn({ points, own }: { points: Point[]; own: { duration: number; ener
         over={over}
       />
       <p class="hint">
-        J over s. The large point is shown; click another to load it.{" "}
+        Energy in J over duration in s. The large point is the motion shown; click another point to
+        load its motion.{" "}
         <Button
           kind="link"
           id="front-csv"

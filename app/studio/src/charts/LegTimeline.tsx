@@ -15,13 +15,16 @@ export function heightsOf(legs: Pick<Leg, "electrical" | "duration">[]): number[
   return powers.map((power) => Math.max(LEAST, most > 0 ? (100 * power) / most : 0));
 }
 
-/** Legs as wide as their time and as high as their mean power; the figures are joules. */
+/** A bar for each leg: its width is the duration, its height the mean power. */
 export function LegTimeline({ cycle: { legs, loads } }: { cycle: CycleShown }) {
   const heights = heightsOf(legs);
   const now = legAt(legs, time.value);
   return (
     <div class="timeline" id="timeline">
-      <p class="hint">Legs as wide as their time, as high as their mean power; joules inside</p>
+      <p class="hint">
+        Each bar is a leg: its width is the duration, its height the mean power, its number the
+        energy in J.
+      </p>
       <div class="legs" role="group" aria-label="Legs of the cycle">
         {legs.map((leg, k) => {
           const text = `${legName(leg)}: ${figure(leg.duration)} s, ${figure(leg.electrical)} J, ${figure(leg.payload_mass)} kg`;

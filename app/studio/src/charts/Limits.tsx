@@ -8,8 +8,8 @@ const NAMES: Record<string, string> = {
   tcp_speed: "TCP speed",
   elbow_speed: "elbow speed",
   path_position: "path, position",
-  path_rotation: "path, turn",
-  path_speed: "least path speed",
+  path_rotation: "path, rotation",
+  path_speed: "minimum path speed",
 };
 const FULL = 0.995; // share of a limit that counts as reached
 
@@ -44,7 +44,7 @@ export function Limits() {
               <button
                 type="button"
                 class="plain bar-row"
-                title={`Worst at ${figure(time)} s`}
+                title={`Largest at ${figure(time)} s`}
                 onClick={() => goTo(time)}
               >
                 {parts}

@@ -12,12 +12,16 @@ import { Others } from "./Others";
 import { Settings } from "./Settings";
 import { Steps } from "./Steps";
 
-const GROUPS = { robot: "For this", software: "For other software", makers: "For other makers" };
+const GROUPS = {
+  robot: "For this",
+  software: "For other software",
+  makers: "For other manufacturers",
+};
 const MOVEJ: Format = {
   name: "movej",
   title: "Program, plain movej",
   about:
-    "The found joints, a few lines to edit. The controller chooses way and time; clearance is not proven.",
+    "The configurations found, in a few lines to edit. The controller chooses path and time; clearance is not proven.",
   not: null,
   group: "robot",
 };
@@ -73,7 +77,7 @@ export function ExportDialog({ onClose }: { onClose: () => void }) {
     save(file.name, file.blob);
     toast.value = [
       file.notes,
-      "Set payload, speed and safety limits on the controller before you run it.",
+      "Set payload, speed and safety limits on the controller before you run the file.",
     ]
       .filter(Boolean)
       .join("; ");
@@ -82,7 +86,7 @@ export function ExportDialog({ onClose }: { onClose: () => void }) {
     <>
       <span class="chip warn">
         <Icon name="alert" />
-        Never run on hardware by us
+        Not tested on hardware
       </span>
       <span class="space" />
       <Button onClick={onClose}>Cancel</Button>
@@ -131,7 +135,7 @@ export function ExportDialog({ onClose }: { onClose: () => void }) {
               )
             );
           })}
-          <h3>Also here</h3>
+          <h3>Other files</h3>
           <Others />
         </div>
         <div class="export-file">
@@ -159,7 +163,7 @@ export function ExportDialog({ onClose }: { onClose: () => void }) {
             </p>
           )}
           {file && (
-            <pre id="preview" tabIndex={0} aria-label="Begin of the file">
+            <pre id="preview" tabIndex={0} aria-label="Beginning of the file">
               {file.text}
             </pre>
           )}

@@ -25,7 +25,7 @@ export function Others() {
     ],
     ["Request (JSON)", () => save("request.json", json(asked), "application/json"), true],
     [
-      "Page that stands alone (HTML)",
+      "Stand-alone page (HTML)",
       async () => save("motion.html", await standalone(shown), "text/html"),
       false,
     ],

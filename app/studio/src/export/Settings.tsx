@@ -41,7 +41,7 @@ export function Settings({
         {format === "movej"
           ? "Share of the controller’s default speed."
           : `${figure((duration - resting) / options.speed + resting)} s. The limits are proven again at this speed.`}{" "}
-        First 10 %, then 30, 60, 100.
+        Begin with 10 %, then use 30, 60 and 100 %.
       </p>
       {switches && (
         <label class="row">

@@ -30,20 +30,20 @@ export function Steps({
   const held = tool ? ` (${first ? "gripper and part" : "gripper"})` : "";
   return (
     <>
-      <h3>Before it runs on your robot</h3>
+      <h3>Before you run the file on your robot</h3>
       <ol class="steps">
         <li>
-          Set the payload of the start, {mass(first)} kg{held}, its centre and your safety limits on
-          the controller.
+          On the controller, set the payload at the start, {mass(first)} kg{held}, its centre of
+          mass, and your safety limits.
           {masses.some((each) => each !== first) &&
-            ` On the way it is up to ${mass(most)} kg: ${
+            ` The payload reaches ${mass(most)} kg during the cycle: ${
               program ? "the program changes it at the stops" : "change it at the stops"
             }.`}
         </li>
-        <li>Jog to the start joints and compare the pose: {start}°.</li>
+        <li>Jog to the start configuration, {start}°, and compare the pose.</li>
         <li>
-          {program ? "Run it in the maker’s simulator" : "Run it in simulation"}, then at{" "}
-          {Math.round(speed * 100)} % with a hand at the stop button.
+          Run the file {program ? "in the manufacturer’s simulator" : "in simulation"}, then at{" "}
+          {Math.round(speed * 100)} % with a hand on the stop button.
         </li>
       </ol>
     </>

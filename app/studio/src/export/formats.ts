@@ -13,8 +13,8 @@ export interface Format {
 
 const TITLES: Record<string, [title: string, about: string]> = {
   urscript: [
-    "Program, the exact motion",
-    "Follows the answer by servoj. The joules are those of this motion.",
+    "Program, exact motion",
+    "Follows the answer by servoj. The energy stated is that of this motion.",
   ],
   rapid: ["RAPID module", "Points that an ABB controller moves through."],
   krl: ["KRL program", "Points that a KUKA controller moves through."],
@@ -22,9 +22,9 @@ const TITLES: Record<string, [title: string, about: string]> = {
   ros2: ["ROS 2 trajectory", "A goal for ros2_control, as YAML."],
   moveit: ["MoveIt", "A RobotTrajectory to check in RViz."],
   csv: ["Table, CSV", "Time, joints, speeds: for a spreadsheet."],
-  json: ["Splines, JSON", "The curves themselves, for own code."],
+  json: ["Splines, JSON", "The curves themselves, for your own code."],
   npz: ["Arrays, NPZ", "The samples for numpy."],
-  joint_limits: ["Joint limits", "A joint_limits.yaml that this path and payload can hold."],
+  joint_limits: ["Joint limits", "A joint_limits.yaml that this path and payload can keep."],
   mcap: ["Recording, MCAP", "For Foxglove, PlotJuggler and ros2 bag play."],
 };
 const MAKERS: Record<string, [RegExp, string]> = {

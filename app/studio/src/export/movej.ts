@@ -9,7 +9,8 @@ const joints = (q: number[]) => `[${q.map(number).join(", ")}]`;
 
 function payload(part: Payload | null, tool: ToolDetail | null): string {
   const load = carried(part, tool);
-  if (!load) throw new Error("Give the payload a centre of mass (com): this program sets it.");
+  if (!load)
+    throw new Error("Enter the centre of mass (com) of the payload: this program sets it.");
   return `  set_target_payload(${number(load.mass)}, [${load.com.map(number).join(", ")}])`;
 }
 
@@ -72,8 +73,8 @@ export function movejProgram(
     ];
   });
   return [
-    "# The found joints; the controller chooses the way and the time between them.",
-    "# Clearance and energy of these ways are not proven.",
+    "# The configurations found; the controller chooses path and time between them.",
+    "# Clearance and energy of these paths are not proven.",
     "def joulepath_movej():",
     ...lines,
     "end",

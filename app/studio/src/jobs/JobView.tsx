@@ -83,7 +83,7 @@ export function JobView({ shown }: { shown: Opened }) {
         {!isOver(job) && <b>{job.eta === null ? "" : `about ${figure(job.eta, 2)} s left`}</b>}
       </div>
       <progress max={1} value={job.progress} aria-label="Progress of the job" />
-      {!isOver(job) && <p class="hint">You may close this page: the service goes on.</p>}
+      {!isOver(job) && <p class="hint">You may close this page: the service continues.</p>}
       <Totals shown={shown} />
       <div class="row" role="group" aria-label="Rows shown">
         {filters.map(([value, text, count]) => (
@@ -100,7 +100,7 @@ export function JobView({ shown }: { shown: Opened }) {
         <span class="space" />
         {lacksDetails(shown) && (
           <Button small onClick={trying(() => loadDetails(job.id))}>
-            Intervals and savings
+            Load intervals and savings
           </Button>
         )}
       </div>
@@ -108,7 +108,7 @@ export function JobView({ shown }: { shown: Opened }) {
         <table class="moves" id="moves">
           <thead>
             <tr>
-              {["no.", "move", "kg", "s", "J", "likely", "nearest usual way", "saves"].map(
+              {["no.", "move", "kg", "s", "J", "interval", "best baseline", "saving"].map(
                 (name, k) => (
                   <th scope="col" key={name} class={k > 1 ? "number" : undefined}>
                     {name}
@@ -139,7 +139,7 @@ const reportJob = (shown: Opened, format: ReportFormat) =>
       job: shown.job.id,
       costs: costsFor(economics.value, null),
     },
-    shown.job.name ?? "A table of moves",
+    shown.job.name ?? "Job",
     format,
   );
 
@@ -166,7 +166,7 @@ function Totals({ shown: { rows, details } }: { shown: Opened }) {
       </div>
       {compared.length > 0 && (
         <div>
-          <dt>less than the nearest usual way, in {compared.length} moves</dt>
+          <dt>less than the best baselines, in {compared.length} moves</dt>
           <dd>{percent(1 - ours / theirs)}</dd>
         </div>
       )}
@@ -208,7 +208,7 @@ function MoveRow({ row, shown }: { row: JobRow; shown: Opened }) {
           {asShown(row.problem.detail ?? row.problem.title ?? "")}{" "}
           {asked && (
             <Button kind="link" onClick={trying(open)}>
-              Open in cell
+              Open in the cell
             </Button>
           )}
         </td>

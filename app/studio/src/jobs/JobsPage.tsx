@@ -62,7 +62,7 @@ export function JobsPage() {
         />
         {jobs.value && !shown.length && (
           <p class="hint">
-            {jobSearch.value ? "No job of this name." : "No job yet: paste a table of moves."}
+            {jobSearch.value ? "No job has this name." : "No job yet: paste a table of moves."}
           </p>
         )}
         <ul class="kept">
@@ -99,8 +99,8 @@ export function JobsPage() {
           <JobView shown={opened.value} />
         ) : (
           <p class="empty">
-            Choose a job, or make a new one from a table of moves: it is computed in the cell as it
-            is now.
+            Choose a job, or create one from a table of moves, which are computed in the current
+            cell.
           </p>
         )}
       </section>

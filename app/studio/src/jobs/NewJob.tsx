@@ -13,7 +13,7 @@ import { loadJob, loadJobs, refusal, type Job } from "./model";
 const SAMPLE = "from; to; kg; x mm; y; z; rx rad; ry; rz; x mm; y; z; rx; ry; rz";
 const SHOWN = 5;
 
-/** A table of moves becomes a job, in the cell as it is now. */
+/** A table of moves becomes a job in the current cell. */
 export function NewJob({ onClose }: { onClose: () => void }) {
   const [text, setText] = useState("");
   const [source, setSource] = useState("a pasted table");
@@ -101,7 +101,7 @@ export function NewJob({ onClose }: { onClose: () => void }) {
           />
         </label>
         <label>
-          or paste: one move in a row
+          or paste one move per row
           <textarea
             id="moves-text"
             rows={9}
@@ -116,8 +116,8 @@ export function NewJob({ onClose }: { onClose: () => void }) {
           />
         </label>
         <p class="hint">
-          Names and kg may be left out. Joint positions may stand in place of poses; with one target
-          in a row, the moves go from each to the next.
+          Names and masses are optional, and joint positions may replace poses. With one target per
+          row, each move leads from one row to the next.
         </p>
         {read && "why" in read && (
           <p class="error" role="alert">
@@ -131,7 +131,7 @@ export function NewJob({ onClose }: { onClose: () => void }) {
         )}
         {choices.length > 1 && (
           <div class="row" id="job-readings">
-            <b>How is it meant?</b>
+            <b>How should this be read?</b>
             {choices.map(({ echo }, k) => (
               <Button key={echo} small pressed={k === chosen} onClick={() => setChosen(k)}>
                 {echo}

@@ -111,7 +111,7 @@ export async function loadDetails(id: string): Promise<Map<number, Detail>> {
 export const lacksDetails = ({ rows, details }: Opened) =>
   rows.some(({ index, energy }) => energy !== null && !details?.has(index));
 
-const AS_FAST = 1.05; // ratio of a way's duration to the answer's up to which it is about as fast
+const AS_FAST = 1.05; // ratio of a baseline's duration to the answer's up to which it is as fast
 
 function keep(
   details: Map<number, Detail>,
@@ -122,7 +122,7 @@ function keep(
   const kept = (result.baselines ?? []).filter(
     (each) => each.within_limits && each.saving !== null,
   );
-  // the nearest of the ways that keep every limit, as in the report
+  // the best of the baselines within all limits, as in the report
   const fast = kept.filter(({ duration }) => duration <= AS_FAST * result.duration!);
   const [rival] = (fast.length ? fast : kept).sort((a, b) => a.saving! - b.saving!);
   details.set(index, {

@@ -80,7 +80,9 @@ export function Answers() {
           />
         ))}
       </ul>
-      {answers?.length === 0 && <p class="hint">{search ? "no answer of this name" : "none"}</p>}
+      {answers?.length === 0 && (
+        <p class="hint">{search ? "No answer has this name." : "No answer yet."}</p>
+      )}
       {next && <Button onClick={trying(() => load(next))}>Older</Button>}
     </section>
   );

@@ -53,7 +53,7 @@ export function OwnRobots() {
       </ul>
       {all?.length === 0 && (
         <p class="hint">
-          {search ? "no robot of this name" : "none: add one in the robot picker of a cell."}
+          {search ? "No robot has this name." : "No robot yet: add one in the picker of a cell."}
         </p>
       )}
     </section>

@@ -55,7 +55,7 @@ export function Studies() {
             <KeptRow
               key={row.number}
               name={title(row)}
-              facts={row.answer ? "" : "no kept answer"}
+              facts={row.answer ? "" : "no stored answer"}
               onOpen={row.answer ? () => openKept(row.answer!) : undefined}
             />
           ))}
@@ -88,7 +88,9 @@ export function Studies() {
           />
         ))}
       </ul>
-      {all?.length === 0 && <p class="hint">{search ? "no study of this name" : "none"}</p>}
+      {all?.length === 0 && (
+        <p class="hint">{search ? "No study has this name." : "No study yet."}</p>
+      )}
     </section>
   );
 }

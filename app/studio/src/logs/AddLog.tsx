@@ -11,11 +11,11 @@ import { addLog, chosen, openedIdentification, openedLog } from "./model";
 
 // the words of this dialog for the settings that the service names
 const WORDS: Record<string, string> = {
-  effort: "Efforts are",
-  columns: "Names of columns",
-  units: "Angles in",
-  current_units: "Currents in",
-  payload: "Payload that it carried",
+  effort: "Meaning of efforts",
+  columns: "Column names",
+  units: "Unit of angles",
+  current_units: "Unit of currents",
+  payload: "Payload",
 };
 
 /** What the service says of a log, in the words of this dialog. */
@@ -79,7 +79,9 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
     const { mass, columns, ...plain } = settings;
     const weight = parseNumber(mass);
     if (mass.trim() && weight === null)
-      return setWhy([{ field: "payload", text: "Enter a number of kg, as 1.5.", link: null }]);
+      return setWhy([
+        { field: "payload", text: "Enter a mass in kg, for example 1.5.", link: null },
+      ]);
     setBusy(true);
     setWhy([]);
     try {
@@ -148,7 +150,7 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
         </label>
         {told("robot")}
         <label>
-          Payload that it carried, kg{" "}
+          Payload, kg{" "}
           <input
             type="text"
             inputMode="decimal"
@@ -158,18 +160,18 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
           />
         </label>
         {told("payload")}
-        {choice("units", "Angles in", ["rad", "deg"])}
+        {choice("units", "Unit of angles", ["rad", "deg"])}
         {told("units")}
-        {choice("current_units", "Currents in", ["A", "mA"])}
+        {choice("current_units", "Unit of currents", ["A", "mA"])}
         {told("current_units")}
-        {choice("effort", "Efforts are", ["auto", "current", "torque", "external"])}
+        {choice("effort", "Meaning of efforts", ["auto", "current", "torque", "external"])}
         {told("effort")}
         <label>
-          Names of columns, as JSON, where they are unusual{" "}
+          Column names as JSON, if they are unusual{" "}
           <input
             type="text"
             value={settings.columns}
-            placeholder="found by themselves"
+            placeholder="detected automatically"
             onInput={set("columns")}
           />
         </label>

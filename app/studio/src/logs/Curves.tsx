@@ -12,7 +12,7 @@ const KEYS: [string, string][] = [
   ["measured", "--ink-2"],
   ["modelled", "--good"],
   ["residual", "--bad"],
-  ["held out: predicted by a fit without it", "--held"],
+  ["held out: predicted by a fit without this move", "--held"],
 ];
 
 type Samples = (number | null)[];
@@ -44,13 +44,13 @@ export function Curves({ moves, logs, robot }: Props) {
     return (
       <article class="wide">
         <h3>Residuals</h3>
-        <p class="hint">None are kept.</p>
+        <p class="hint">No residuals are stored.</p>
       </article>
     );
   return (
     <article class="wide">
       <h3>
-        Measured and modelled <small>drag to zoom, double click to see all</small>{" "}
+        Measured and modelled <small>drag to zoom, double-click to reset</small>{" "}
         <select
           aria-label="Moves shown"
           value={index}

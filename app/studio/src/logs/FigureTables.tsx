@@ -7,8 +7,8 @@ const UNITS: Record<string, string> = { offset: "N·m", payload_mass: "kg", link
 const POWER: Record<string, [string, string]> = {
   rmse: ["power, root mean square", "W"],
   energy_mean: ["energy of a move, mean", "%"],
-  energy_p90: ["its 90th percentile", "%"],
-  energy_max: ["its greatest", "%"],
+  energy_p90: ["energy of a move, 90th percentile", "%"],
+  energy_max: ["energy of a move, maximum", "%"],
 };
 
 /**
@@ -26,8 +26,8 @@ export function ErrorTable({ validation, robot }: { validation: Validation; robo
           "",
           "%",
         ]),
-        ["energy at the shafts", fitted.torque.shaft_energy, own.torque.shaft_energy, "", "%"],
-        ["energy in copper", fitted.torque.copper_energy, own.torque.copper_energy, "", "%"],
+        ["shaft energy", fitted.torque.shaft_energy, own.torque.shaft_energy, "", "%"],
+        ["copper loss", fitted.torque.copper_energy, own.torque.copper_energy, "", "%"],
       ]
     : [];
   const power = fitted.power
@@ -42,7 +42,7 @@ export function ErrorTable({ validation, robot }: { validation: Validation; robo
   return (
     <article>
       <h3>
-        Errors <small>on {moves} moves that the fit has not seen</small>
+        Errors <small>on {moves} moves held out from the fit</small>
       </h3>
       <Table
         label="Errors"
@@ -51,8 +51,8 @@ export function ErrorTable({ validation, robot }: { validation: Validation; robo
       />
       {coverage !== null && (
         <p class="hint">
-          {percent(coverage)} of the energies lie between their P5 and P95, which are{" "}
-          {figure(half_width, 2)} % below and above the middle.
+          {percent(coverage)} of the energies lie within their 90 % intervals, which extend{" "}
+          {figure(half_width, 2)} % to both sides of the prediction.
         </p>
       )}
     </article>
@@ -94,7 +94,7 @@ export function FigureTable({
       <h3>
         Figures{" "}
         <small>
-          trust: A maker's, B fitted to measured data, C second-hand, T of a sister robot, E default
+          trust: A manufacturer, B fitted to measured data, C second-hand, T sister robot, E default
         </small>
       </h3>
       <Table

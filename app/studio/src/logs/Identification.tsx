@@ -41,7 +41,7 @@ export function Identification() {
     const cell = same ? request.value : withRobot(request.value, robot, robotNow.value);
     edit({ ...cell, figures: found.figures });
     page.value = "cell";
-    toast.value = `The cell has ${same ? "" : `a ${robot.title} with `}these figures now: Optimise computes with them.`;
+    toast.value = `The cell now has ${same ? "" : `a ${robot.title} with `}these figures: optimise again to use them.`;
   };
   return (
     <div id="identification">
@@ -51,7 +51,7 @@ export function Identification() {
           <p class="hint">
             {found.name && `Identification of ${robot.name}, `}
             {new Date(found.created).toLocaleString()}, {told} of {result.parameters.length} figures
-            told by the logs
+            identified
           </p>
         </div>
         <span class="space" />
@@ -70,7 +70,7 @@ export function Identification() {
   );
 }
 
-/** What is odd in the logs or in what was found, and what would help most. */
+/** Warnings on the logs and the identified figures, and advice on what would help most. */
 function Advice({
   result,
   robot,
@@ -84,19 +84,19 @@ function Advice({
 }) {
   const { residuals, physical, measure, payload } = result;
   const all = [
-    !figures && "The figures are not stored: there was no room, or they were deleted.",
+    !figures && "The figures are not stored: there was no space, or they were deleted.",
     payload &&
       (payload.why ??
-        `The last log carried ${figure(payload.mass)} ± ${figure(payload.mass_sd, 2)} kg.`),
-    physical && !physical.consistent && "Not all links are real bodies.",
+        `The payload of the last log is ${figure(payload.mass)} ± ${figure(payload.mass_sd, 2)} kg.`),
+    physical && !physical.consistent && "Not all identified links are physically consistent.",
     !residuals.white &&
-      "Neighbouring residuals are alike: something moves that the model does not have. Standard deviations are over motions, and hold.",
+      "Neighbouring residuals are correlated: the model lacks an effect. The standard deviations are computed over whole motions, and remain valid.",
     ...logs.flatMap(({ id, name, warnings }) =>
       warnings.map((text) => `${name ?? id.slice(0, 8)}: ${text}`),
     ),
     ...measure.map(({ share, figure: name, joint, do: text }) => {
       const place = joint === null ? "" : `, ${jointName(robot.joints[joint]!)}`;
-      return `${percent(share)} of the energy's uncertainty is from ${words(name)}${place}. ${text}`;
+      return `${percent(share)} of the energy's uncertainty is due to ${words(name)}${place}. ${text}`;
     }),
   ].filter((text) => typeof text === "string");
   return (
@@ -109,7 +109,7 @@ function Advice({
           ))}
         </ul>
       ) : (
-        <p class="hint">none</p>
+        <p class="hint">None.</p>
       )}
     </article>
   );

@@ -38,8 +38,8 @@ export function LogView({ log }: { log: LogDetail }) {
           <h2>{log.name ?? log.id.slice(0, 8)}</h2>
           <p class="hint">
             {titles[0]} · {figure(log.duration)} s · {moving} moves · {figure(log.rate)} Hz ·
-            carried {figure(log.payload)} kg
-            {log.effort && ` · efforts are a ${log.effort.meaning}`}
+            payload {figure(log.payload)} kg
+            {log.effort && ` · efforts: ${log.effort.meaning}`}
           </p>
         </div>
         <span class="space" />
@@ -62,10 +62,10 @@ export function LogView({ log }: { log: LogDetail }) {
       ))}
       {robotName(request.value) !== log.robot && (
         <Note kind="warning">
-          This log is of a {titles[0]}; the cell has a {titles[1]}.
+          This log is from a {titles[0]}, but the cell has a {titles[1]}.
         </Note>
       )}
-      <h3>Measured and predicted joules</h3>
+      <h3>Measured and predicted energy</h3>
       {usable && (
         <label>
           <input
@@ -107,9 +107,9 @@ function Measured({ found: { segments, cycles, total } }: { found: Evaluation })
     "",
     "s",
     ...(electrical ? ["measured, J"] : []),
-    ...(efforts ? ["by currents, J"] : []),
+    ...(efforts ? ["from currents, J"] : []),
     "predicted, J",
-    "likely",
+    "90 % interval",
     "difference",
   ];
   const spanned = (name: string, part: Evaluated, key: string) => ({
@@ -124,7 +124,7 @@ function Measured({ found: { segments, cycles, total } }: { found: Evaluation })
     <>
       {!electrical && !efforts && (
         <p class="hint">
-          Neither power nor currents nor torques were logged: nothing is measured to compare with.
+          The log contains no power, currents or torques, so there is no measured energy.
         </p>
       )}
       <div id="measured">
@@ -135,10 +135,10 @@ function Measured({ found: { segments, cycles, total } }: { found: Evaluation })
         />
       </div>
       <p class="hint">
-        {electrical && "Measured: power at the arm’s bus over time. "}
+        {electrical && "Measured: integral of the power at the arm’s bus. "}
         {efforts &&
-          "By currents: shaft work, copper loss and the electronics of the robot’s figures. "}
-        Difference: measured beyond predicted.
+          "From currents: shaft work, copper loss and idle power, with the robot’s figures. "}
+        Difference: measured relative to predicted.
       </p>
     </>
   );

@@ -23,7 +23,7 @@ import {
   openLog,
 } from "./model";
 
-/** Logs of one's own arm: measured against predicted joules, and figures found from them. */
+/** Logs of the user's arm: measured and predicted energy, and figures identified from them. */
 export function LogsPage() {
   const [file, setFile] = useState<File | null>(null);
   useEffect(() => {
@@ -85,7 +85,7 @@ export function LogsPage() {
         {logs.value && !shown.length && (
           <p class="hint">
             {logSearch.value
-              ? "No log of this name."
+              ? "No log has this name."
               : "No log yet: add a CSV file of your arm (RTDE, ROS, or t, q1 …)."}
           </p>
         )}
@@ -114,7 +114,7 @@ export function LogsPage() {
         <Button
           id="identify"
           disabled={!chosen.value.length || Boolean(busy.value)}
-          title="Friction, rotors, power of your own arm"
+          title="Identify friction, rotors and power of your own arm"
           onClick={trying(() => identify(chosen.value))}
         >
           Identify from {chosen.value.length} {chosen.value.length === 1 ? "log" : "logs"}
@@ -123,13 +123,15 @@ export function LogsPage() {
           <div role="status" id="identifying">
             <p class="hint">{busy.value.text}</p>
             {busy.value.share !== null && (
-              <progress max={1} value={busy.value.share} aria-label="Fits that are done" />
+              <progress max={1} value={busy.value.share} aria-label="Completed fits" />
             )}
           </div>
         )}
         <h2>Identifications</h2>
         {!identifications.value.length && (
-          <p class="hint">{logSearch.value ? "None of this name." : "None yet."}</p>
+          <p class="hint">
+            {logSearch.value ? "No identification has this name." : "No identification yet."}
+          </p>
         )}
         <ul class="kept">
           {identifications.value.map((each) => (
@@ -154,7 +156,7 @@ export function LogsPage() {
           <LogView key={openedLog.value.id} log={openedLog.value} />
         ) : (
           <p class="empty">
-            Choose a log to see measured against predicted joules of each move; tick logs to
+            Choose a log to compare the measured and predicted energy of each move. Tick logs to
             identify the figures of your own arm.
           </p>
         )}

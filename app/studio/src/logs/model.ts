@@ -192,7 +192,7 @@ export async function openIdentification(id: string): Promise<void> {
     if (found.problem) throw new Problem(found.problem);
     if (!found.result)
       throw new Problem({
-        title: "Nothing was found",
+        title: "No result",
         detail: `The identification is ${found.state}.`,
       });
     const { moves } = await get<{ moves: MoveCurves[] | null }>(`${path}/residuals`);

@@ -71,7 +71,7 @@ export function Picture() {
       {!hasWebGl && (
         <p id="no-view">
           This browser offers no WebGL, so the arm cannot be drawn. Charts, tables and downloads
-          work.
+          still work.
         </p>
       )}
       {hasWebGl && (
@@ -93,7 +93,7 @@ export function Picture() {
             </p>
           )}
           {stale.value && !looked.value && !dragNote.value && (
-            <p class="drag-note">The old motion is hidden: it is not one of this cell.</p>
+            <p class="drag-note">The previous motion is hidden, because the cell has changed.</p>
           )}
         </>
       )}
@@ -101,7 +101,7 @@ export function Picture() {
   );
 }
 
-/** What a place that is looked at needs; the panel says it with more. */
+/** The energy at the selected place; the panel says more. */
 function placeNote(): string {
   const now = looked.value;
   if (!now || now.state === "moving") return "";
@@ -120,7 +120,7 @@ function describe(): string {
 function frameNote(): string {
   const pendant = pictured.value?.robot.title.startsWith("Universal Robots");
   return pendant
-    ? "Base frame as on the pendant; ROS base_link is turned by 180° about z"
+    ? "Base frame as on the pendant; ROS base_link is rotated by 180° about z"
     : "Base frame of the robot";
 }
 

@@ -12,9 +12,9 @@ const SHOWN: [keyof typeof show.value, string][] = [
   ["path", "path of the TCP"],
   ["nearest", "nearest pair"],
   ["margins", "margins of obstacles"],
-  ["capsules", "what collision checks see"],
+  ["capsules", "bodies of the collision check"],
   ["axes", "base frame"],
-  ["fade", "fade what hides the arm"],
+  ["fade", "fade bodies that hide the arm"],
 ];
 const VIEWS = ["Clearest", "From −y", "From x", "From −x", "From y", "From above"];
 
@@ -66,7 +66,7 @@ function DragTools() {
   ];
   const dragging = tool.value === "move" || tool.value === "turn";
   return (
-    <div class="tools" role="toolbar" aria-label="By hand">
+    <div class="tools" role="toolbar" aria-label="Editing in the picture">
       <Button
         kind="quiet"
         small
@@ -88,7 +88,7 @@ function DragTools() {
       {dragging && (
         <select
           id="drag"
-          aria-label="What is dragged"
+          aria-label="Object to drag"
           value={selected.value ?? ""}
           onChange={(event) => (selected.value = event.currentTarget.value)}
         >

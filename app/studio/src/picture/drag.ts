@@ -138,11 +138,11 @@ export class Drag {
         const [first] = (free.length ? free : [...solutions]).sort((a, b) => far(a.q) - far(b.q));
         reachedGhost.value = first?.q ?? null;
         const collisions = free.length
-          ? `${free.length} of them without a collision`
-          : "all of them in a collision";
+          ? `${free.length} of them without collision`
+          : "all of them in collision";
         dragNote.value = first
           ? `Reached by ${solutions.length} configurations, ${collisions}.`
-          : "No configuration reaches it.";
+          : "No configuration reaches this pose.";
       } catch (error) {
         reachedGhost.value = null;
         dragNote.value = (error as Error).message;

@@ -139,7 +139,7 @@ export class PlaceMap {
         colour(name === "best" ? "--goal" : "--start"),
       );
       mesh.renderOrder = 1;
-      const energy = end.of ? `${figure(end.of.energy)} J` : "cannot work";
+      const energy = end.of ? `${figure(end.of.energy)} J` : "not feasible";
       const [x, y] = end.at;
       this.view.labels.put(`place ${name}`, `${name}: ${energy}`, this.seen(x, y), "place");
     }

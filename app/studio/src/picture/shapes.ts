@@ -171,7 +171,7 @@ const READERS: Record<string, (bytes: Uint8Array) => Promise<THREE.Object3D>> = 
 /** The object in a file of a format: `stl`, `obj` or `glb`. */
 export function readMeshes(format: string, bytes: Uint8Array): Promise<THREE.Object3D> {
   const read = READERS[format];
-  return read ? read(bytes) : Promise.reject(new Error(`There is no reader of ${format}.`));
+  return read ? read(bytes) : Promise.reject(new Error(`There is no reader for ${format}.`));
 }
 
 /** The sides of the box around a file's meshes, in the file's own unit; null without meshes. */

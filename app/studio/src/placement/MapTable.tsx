@@ -29,7 +29,7 @@ export function MapTable() {
               (layer.value = { ...layer.value, height: value === "" ? null : Number(value) })
             }
           >
-            <option value="">the best of all</option>
+            <option value="">best of all</option>
             {heights.map((value) => (
               <option key={value} value={value}>
                 {shown(value, "mm")} mm
@@ -47,7 +47,7 @@ export function MapTable() {
               (layer.value = { ...layer.value, mount: (value as Mount) || null })
             }
           >
-            <option value="">the best of all</option>
+            <option value="">best of all</option>
             {mounts.map((name) => (
               <option key={name}>{name}</option>
             ))}
@@ -64,7 +64,7 @@ export function MapTable() {
             <button
               type="button"
               class="plain"
-              title="Look at this place"
+              title="Select this place"
               onClick={trying(() => look(place.pose))}
             >
               {place.at.map((value) => shown(value, "mm")).join(", ")}

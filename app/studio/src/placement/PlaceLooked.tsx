@@ -13,7 +13,7 @@ import { trying } from "../store/trouble";
 import { figure, percent, shown, typedValue, UNITS } from "../store/units";
 import { robotNow } from "../picture/pictured";
 
-/** The place of the base that is looked at: its numbers, its joules, and the button that takes it. */
+/** The selected place of the base: its coordinates, its energy, and the button that accepts it. */
 export function PlaceLooked() {
   const now = looked.value;
   const robot = robotNow.value;
@@ -37,8 +37,8 @@ export function PlaceLooked() {
   };
   return (
     <Section
-      title="Place that is looked at"
-      note={now ? "moved by" : "where it stands now"}
+      title="Selected place"
+      note={now ? "offset from the current place" : "current place"}
       id="place-looked"
       action={
         <Button kind="link" onClick={drag}>
@@ -63,7 +63,7 @@ export function PlaceLooked() {
       </div>
       {wrong && (
         <p class="error" role="alert">
-          Enter a number: {wrong}.
+          Enter a number for {wrong}.
         </p>
       )}
       <p role="status" id="place-joules">
@@ -79,7 +79,7 @@ export function PlaceLooked() {
           >
             Accept this place
           </Button>
-          <Button onClick={stopLooking}>Back to where it stands</Button>
+          <Button onClick={stopLooking}>Back to the current place</Button>
         </div>
       )}
     </Section>
@@ -92,13 +92,13 @@ function joules(): string {
   const here = hereNow();
   if (!now)
     return here === null ? "Click a point of the map, or drag the base." : `${figure(here)} J`;
-  if (now.state === "moving") return "Release it to compute.";
+  if (now.state === "moving") return "Release the base to compute the energy.";
   if (now.state === "failed") return now.why;
   const known = now.energy === null ? "" : `${figure(now.energy)} J${against(now.energy, here)}`;
   return now.state === "computing" ? `${known ? `${known} · ` : ""}Computing …` : known;
 }
 
-/** Energy where the robot stands now [J]; null if it is not known. */
+/** Energy at the current place of the robot [J]; null if it is not known. */
 const hereNow = () =>
   mapShown.value?.answer.nominal?.energy ??
   (answered.value && !stale.value ? energyOf(answered.value) : null);
@@ -106,7 +106,7 @@ const hereNow = () =>
 function against(energy: number, here: number | null): string {
   if (!here) return "";
   const saving = 1 - energy / here;
-  if (Math.abs(saving) < 0.0005) return ", as much as now";
+  if (Math.abs(saving) < 0.0005) return ", the same as now";
   return `, ${percent(Math.abs(saving))} ${saving > 0 ? "less" : "more"} than now`;
 }
 

@@ -12,12 +12,12 @@ import { MapTable } from "./MapTable";
 import { PlaceLooked } from "./PlaceLooked";
 import { RegionFields } from "./RegionFields";
 
-/** Where to put the robot: the region, what was found, and the place that is looked at. */
+/** Placement of the robot: the region, the best place found, and the selected place. */
 export function PlacementPanel() {
   return (
-    <aside class="answer" id="placement" aria-label="Where to put the robot" tabIndex={0}>
+    <aside class="answer" id="placement" aria-label="Placement of the robot" tabIndex={0}>
       <div class="panel-head">
-        <h2>Where to put the robot</h2>
+        <h2>Placement of the robot</h2>
         <span class="space" />
         <Button kind="quiet" icon="close" label="Close" onClick={close} />
       </div>
@@ -42,17 +42,17 @@ function Found() {
     <section class={`hero${stale ? " stale" : ""}`} aria-label="Best place" id="best-place">
       {stale && (
         <p class="warning-text" id="map-stale">
-          <Icon name="alert" /> This map is older than {mapChanges.value.length} of your changes:
+          <Icon name="alert" /> This map does not include {mapChanges.value.length} of your changes:
           search again, or undo them.
         </p>
       )}
-      <p class="hint">Best place that was found</p>
+      <p class="hint">Best place found</p>
       <p class="big">
         {stale ? <s>{joules}</s> : joules} <small>J</small>
       </p>
       <dl class="facts">
         <div>
-          <dt>where it stands now</dt>
+          <dt>current place</dt>
           <dd>
             {nominal
               ? `${figure(nominal.energy)} J`
@@ -62,22 +62,22 @@ function Found() {
           </dd>
         </div>
         <div>
-          <dt>saved</dt>
+          <dt>saving</dt>
           <dd id="place-saving">{saving === null ? "–" : percent(saving)}</dd>
         </div>
         <div>
-          <dt>at no place less than</dt>
+          <dt>lower bound of all places</dt>
           <dd>{answer.lower_bound === null ? "no bound" : `${figure(answer.lower_bound)} J`}</dd>
         </div>
         <div>
-          <dt>places computed, on the map and beside it</dt>
+          <dt>places computed, also outside the map</dt>
           <dd>{answer.evaluated}</dd>
         </div>
       </dl>
       {answer.left_out > 0 && (
         <p class="warning-text">
-          {answer.left_out} of the {map.places.length} places of the map were left out at the
-          deadline.
+          {answer.left_out} of the {map.places.length} places of the map were not computed before
+          the deadline.
         </p>
       )}
       {answer.warnings.map((text) => (
@@ -89,8 +89,8 @@ function Found() {
         <thead>
           <tr>
             <td />
-            <th scope="col">moved by</th>
-            <th scope="col">within 2 % of the best</th>
+            <th scope="col">offset</th>
+            <th scope="col">tolerance for 2 % more energy</th>
           </tr>
         </thead>
         <tbody>
@@ -109,7 +109,7 @@ function Found() {
       </table>
       <div class="row">
         <Button small disabled={stale} onClick={trying(() => look(bestPose(map)))} id="look-best">
-          Look at the best place
+          Select the best place
         </Button>
         {!stale && <ReportMenu write={reportPlaces} id="report-places" />}
       </div>

@@ -15,7 +15,7 @@ export function RegionFields() {
   const checked = regionOf(given, 0);
   const why =
     kind.value === "path"
-      ? "A path is placed as a stop of a cycle: choose Cycle."
+      ? "Only moves and cycles can be placed: choose Cycle, and make the path a stop."
       : (lackOf(request.value)?.text ?? ("why" in checked ? checked.why : null));
   const running = run.value?.endpoint === "placement";
   const mount = (name: Mount, on: boolean) => {
@@ -23,12 +23,12 @@ export function RegionFields() {
     regionTyped.value = { ...given, mounts };
   };
   return (
-    <Section title="Where it may stand" note="moved from where it stands now" id="region">
+    <Section title="Region of the base" note="offsets from the current place" id="region">
       {COORDINATES.map((name) => (
         <Range key={name} name={name} />
       ))}
       <fieldset class="field">
-        <legend>Mounts, that of now among them</legend>
+        <legend>Mounts, including the current one</legend>
         {MOUNTS.map((name) => (
           <label key={name}>
             <input
@@ -40,8 +40,8 @@ export function RegionFields() {
           </label>
         ))}
       </fieldset>
-      <Amount text="Distance of places" field="step" sign="mm" empty="auto" />
-      <Amount text="Time to search" field="deadline" sign="s" />
+      <Amount text="Spacing of places" field="step" sign="mm" empty="auto" />
+      <Amount text="Search time" field="deadline" sign="s" />
       {refused.value && <Note kind="error">{refused.value}</Note>}
       {running ? (
         <Progress />
@@ -56,7 +56,7 @@ export function RegionFields() {
             Search for the best place
           </Button>
           <p class="hint" role="status">
-            {why ?? "Every place is computed with its collisions; the best one is shown."}
+            {why ?? "Collisions are checked at every place. The best place is shown."}
           </p>
         </>
       )}

@@ -95,7 +95,7 @@ export const brokenOff = (error?: unknown) =>
   isAbort(error)
     ? error
     : new Problem({
-        title: "The answer broke off",
+        title: "The answer was interrupted",
         detail:
           "The connection to the service ended before the answer was complete. Your work is saved " +
           "here: send the request again.",

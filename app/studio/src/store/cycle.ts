@@ -20,7 +20,7 @@ export async function cycleAnswered(
     cycle.legs.map(({ answer }) => (answer ? keptAnswer<Solution>(answer) : null)),
   );
   const first = moves.find((move) => move !== null);
-  if (!first) throw new Error("This cycle has no move that could be shown.");
+  if (!first) throw new Error("This cycle contains no move to show.");
   const worst = cycle.certificate.clearance;
   const clearance = worst && { ...worst, time: worst.time + (cycle.legs[worst.leg ?? 0]?.t0 ?? 0) };
   const solution: Solution = {

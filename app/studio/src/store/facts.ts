@@ -4,24 +4,24 @@ import type { Answered } from "./state";
 import { figure, words } from "./units";
 
 export const BASELINES: Record<string, string> = {
-  trapezoid: "Trapezoid in joints",
-  quintic: "Quintic in joints",
-  ruckig: "Fastest in time",
-  ruckig_slowed: "Fastest, slowed",
-  straight: "Straight in joints",
+  trapezoid: "Trapezoidal speed profile",
+  quintic: "Quintic polynomial",
+  ruckig: "Time-optimal motion",
+  ruckig_slowed: "Time-optimal, slowed down",
+  straight: "Straight line in joint space",
   controller_default: "Controller default",
-  waypoints: "Via points, with rests",
-  blended: "Via points, rounded",
-  even_speed: "Even speed along the path",
-  stopping: "Rests at every stop",
-  move_by_move: "Each move by itself",
-  same_factor: "All moves slowed alike",
-  fastest_then_wait: "Fastest, then a wait",
-  given_order: "In the given order",
-  without_storage: "Without the storage",
+  waypoints: "Via points with stops",
+  blended: "Rounded via points",
+  even_speed: "Constant speed on the path",
+  stopping: "Rest at every stop",
+  move_by_move: "Each move chosen alone",
+  same_factor: "All moves scaled equally",
+  fastest_then_wait: "Fastest cycle, then a wait",
+  given_order: "Stops in the given order",
+  without_storage: "Without energy storage",
 };
 
-/** The name of a usual way; along a path, none moves straight in the joints. */
+/** The name of a baseline; along a path, the quintic is one of the path. */
 export const baselineName = (name: string, along = false) =>
   along && name === "quintic"
     ? "Quintic along the path"
@@ -71,7 +71,7 @@ export const postureWords = (label: string) =>
 // fields that the service names in a sentence, in the words of the panel
 const NAMED: Record<string, string> = {
   "`controller_default`": "“Controller default”",
-  "`payload.shape`": "“Form” of the payload",
+  "`payload.shape`": "“Shape” of the payload",
   "`tool.capsules`": "the capsules of the tool",
 };
 

@@ -32,26 +32,28 @@ export function parseMoves(text: string, joints: number): MovesRead {
     .map(cellsOf)
     .filter((cells) => cells.some(Boolean));
   const [first] = lines;
-  if (!first) return { why: "Paste a table: one move in a row." };
+  if (!first) return { why: "Paste a table with one move per row." };
   const headed = first.filter(isNumber).length < joints;
   const head = headed ? first.map((cell) => cell.toLowerCase()) : null;
   const rows = (headed ? lines.slice(1) : lines).map((cells) => rowOf(cells, head));
   if (!rows.length)
-    return { why: "No row of numbers was found below the first line: paste one move in a row." };
+    return { why: "No row of numbers was found below the first line: paste one move per row." };
   const odd = rows.findIndex(({ odd }) => odd !== null);
   if (odd >= 0)
-    return { why: `Row ${odd + 1}: “${rows[odd]!.odd}” is no mass in kg. Correct or delete it.` };
+    return {
+      why: `Row ${odd + 1}: “${rows[odd]!.odd}” is not a mass in kg: correct or delete it.`,
+    };
   const units = head ? unitsOf(head.join(" ")) : "";
   const count = rows[0]!.numbers.length;
   const wrong = rows.findIndex(({ numbers }) => numbers.length !== count);
   if (wrong >= 0)
     return {
-      why: `Row ${wrong + 1} has ${rows[wrong]!.numbers.length} numbers, the first one ${count}.`,
+      why: `Row ${wrong + 1} has ${rows[wrong]!.numbers.length} numbers, but row 1 has ${count}.`,
     };
   const moves = movesOf(rows, count, joints, units);
   if (!moves)
     return {
-      why: `${count} numbers are in a row: a move has 12 (6 of the start, 6 of the goal), a target 6.`,
+      why: `Each row has ${count} numbers: a move needs 12 (6 for the start, 6 for the goal), a target 6.`,
     };
   const parsed = parseAlike(
     moves.flatMap(({ start, goal }) => [start, goal]),

@@ -71,7 +71,7 @@ export async function openProject(project: Saved): Promise<void> {
     const path = `answers/${encodeURIComponent(project.answer)}`;
     await showAnswer(await keptAnswer(path), project.asked);
   } catch {
-    toast.value = "The answer of this project is no longer kept: optimise again.";
+    toast.value = "The answer of this project is no longer stored: optimise again.";
   }
 }
 
@@ -80,11 +80,11 @@ export async function openKept(path: string): Promise<void> {
   const address = path.includes("/") ? path : `answers/${encodeURIComponent(path)}`;
   const { name, request: sent, typed, answer } = await get<Kept>(address);
   if (!answer?.branch && !answer?.legs)
-    throw new Error("Only motions and cycles are shown here: this answer is of another kind.");
+    throw new Error("Only answers with a motion or a cycle can be shown here.");
   const here = answer.id ? await askedFor(answer.id) : null;
   const request = here?.request ?? sent ?? requestOfMove(answer);
   replaceCell({
-    project: { id: newId(), name: name ?? `Kept ${answer.id?.slice(0, 8) ?? "answer"}` },
+    project: { id: newId(), name: name ?? `Answer ${answer.id?.slice(0, 8) ?? ""}`.trim() },
     request,
     typed: here?.typed ?? typed ?? {},
     economics: here?.economics,
@@ -92,7 +92,7 @@ export async function openKept(path: string): Promise<void> {
   page.value = "cell";
   await showAnswer(answer, request);
   if (!here && !sent)
-    toast.value = "A part of an answer has no request: targets are the joints of the answer.";
+    toast.value = "This part of an answer has no request: its joint positions are the targets.";
 }
 
 /**

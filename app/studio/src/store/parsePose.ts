@@ -71,7 +71,10 @@ export function parseAlike(texts: string[], joints = 6, prefer?: Reading["kind"]
   for (const readings of open) {
     shared = shared.filter((echo) => echoesOf(readings).includes(echo));
     if (!shared.length)
-      return { why: "It cannot be read like the rows above it.", row: all.indexOf(readings) };
+      return {
+        why: "Its format differs from that of the rows above: use one format.",
+        row: all.indexOf(readings),
+      };
   }
   const likely = shared.filter((echo) => clear.includes(echo));
   const echoes = likely.length ? likely : shared;
@@ -118,7 +121,7 @@ function readingsOf(text: string, joints: number, prefer?: Reading["kind"]): Par
   if (readings.length) return { readings };
   if (numbers.length !== 6 && numbers.length !== joints)
     return {
-      why: `Numbers found: ${numbers.length}. A pose has 6, this arm has ${joints} joints.`,
+      why: `Numbers found: ${numbers.length}. A pose has 6, and this arm has ${joints} joints.`,
     };
   return { why: farAway(numbers) };
 }
@@ -134,7 +137,7 @@ function choose(poses: Reading[], joints: Reading[], prefer?: Reading["kind"]): 
 
 function farAway(numbers: number[]): string {
   const away = Math.hypot(...numbers.slice(0, 3)) / 1000;
-  return `As a pose in mm this is ${away.toFixed(1)} m away from the base: check the units.`;
+  return `As a pose in mm, this is ${away.toFixed(1)} m from the base: check the units.`;
 }
 
 export function numbersOf(text: string): number[] {

@@ -159,7 +159,7 @@ export async function saveNow(): Promise<void> {
     const others = (await projects()).map(({ name }) => name);
     const name = freshName(record.name, others);
     project.value = { id: newId(), name };
-    toast.value = `Another tab has changed ${record.name} meanwhile: this one is ${name} now.`;
+    toast.value = `Another tab has changed ${record.name}: your version is now ${name}.`;
   } catch {
     saved.value = "failed"; // a private window, or no room
   }

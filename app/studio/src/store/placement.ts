@@ -101,19 +101,19 @@ export function regionOf(given: RegionTyped, yaw: number): Asked | { why: string
   const region: Record<string, unknown> = {};
   for (const name of COORDINATES.filter((each) => given.free[each])) {
     const ends = given[name].map((text) => typedValue(text, UNIT[name]));
-    if (ends.includes(null)) return { why: `Enter two numbers: ${name} of the region.` };
+    if (ends.includes(null)) return { why: `Enter two numbers for ${name} of the region.` };
     const [low, high] = ends as [number, number];
     if (!(low <= 0 && 0 <= high && low < high))
-      return { why: `${name}: 0, where the robot stands now, lies between both numbers.` };
+      return { why: `The range of ${name} must contain 0, the current place of the robot.` };
     region[name] = name === "yaw" ? [yaw + low, yaw + high] : [low, high];
   }
   if (given.mounts.length > 1) region.mounts = given.mounts;
   if (!Object.keys(region).length) return { why: "Tick what may change: x, y, z, yaw or mounts." };
   const deadline = typedValue(given.deadline, "s");
-  if (deadline === null || deadline <= 0) return { why: "Enter the seconds of the search." };
+  if (deadline === null || deadline <= 0) return { why: "Enter the search time in seconds." };
   if (!given.step.trim()) return { region, deadline };
   const resolution = typedValue(given.step, "mm");
-  if (resolution === null || resolution <= 0) return { why: "Enter the distance of places." };
+  if (resolution === null || resolution <= 0) return { why: "Enter the spacing of places in mm." };
   return { region, resolution, deadline };
 }
 
@@ -189,7 +189,7 @@ export async function look(pose: Matrix): Promise<void> {
   };
   if (known?.reason) return next({ state: "failed", why: `${capital(REASONS[known.reason])}.` });
   if (run.value && !computing)
-    return next({ state: "failed", why: "Something else is being computed: wait, or cancel it." });
+    return next({ state: "failed", why: "Another computation is running: wait, or cancel it." });
   next({ state: "computing", energy: known?.energy ?? null });
   computing += 1;
   try {
@@ -243,6 +243,6 @@ export function accept(): void {
     edit(asked, typed.value);
     display(motion);
     close();
-    toast.value = "All poses are seen from the new place of the base now.";
+    toast.value = "All poses now refer to the new place of the base.";
   });
 }

@@ -12,12 +12,12 @@ export type Mount = (typeof MOUNTS)[number];
 export const REASONS = {
   reach: "out of reach",
   collision: "in collision",
-  torque: "too little torque",
+  torque: "insufficient torque",
   time: "takes too long",
   motion: "no motion found",
 } as const;
 export type Reason = keyof typeof REASONS;
-export const LEFT_OUT = "left out";
+export const LEFT_OUT = "not computed";
 
 interface MapPoint {
   base: Pose;

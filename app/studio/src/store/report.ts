@@ -21,7 +21,7 @@ export function costsFor(given: Economics, cyclesPerShift: number | null) {
     ...(asked ? { cycles_per_shift: yours(cyclesPerShift) } : {}),
     shifts_per_year:
       shiftsPerYear === DEFAULT_ECONOMICS.shiftsPerYear
-        ? { value: shiftsPerYear, source: "assumed: two on 230 days", letter: "E" }
+        ? { value: shiftsPerYear, source: "assumed: two shifts on 230 days", letter: "E" }
         : yours(shiftsPerYear),
     price: given.price,
     carbon: given.carbon,

@@ -151,7 +151,7 @@ export function freshName(name: string, others: unknown[]): string {
 /** What the request lacks before it can be sent; null if nothing. */
 export function lackOf(request: ApiRequest): { pointer: Pointer; text: string } | null {
   if (kindOf(request) === "cycle" && !listOf(request.stops).length)
-    return { pointer: "/stops", text: "Add a stop: a cycle has at least one." };
+    return { pointer: "/stops", text: "Add a stop: a cycle needs at least one." };
   for (const row of rowsOf(request))
     if (targetAt(request, row).kind === "empty")
       return { pointer: row.pointer, text: `${row.name} is empty: type, paste or take a pose.` };

@@ -97,7 +97,9 @@ const inFrame = ({ frame, ...pose }: Fields, into: Into): Fields => posed(pose, 
 function posed(given: Fields, T: Matrix): Fields {
   const { position = [0, 0, 0], orientation, quaternion, rpy, rotvec, ...others } = given;
   if (!Array.isArray(position) || "pose" in given)
-    throw new Error("A pose is in the form of ROS: give position and rotvec, to move the base.");
+    throw new Error(
+      "A pose has the form of ROS: give position and rotvec, so that the base can be moved.",
+    );
   const own = { quaternion, rpy, rotvec } as Partial<Pose>;
   const { rotvec: turn, ...at } = poseOfMatrix(multiply(T, ofPose({ position, ...own })));
   const moved = { position: at.position.map(tidy), rotvec: turn!.map(tidy) };

@@ -35,9 +35,9 @@ export function cellOf(text: string): Cell {
   const value = parsed(text);
   const cell = isObject(value.request) ? cellFrom(value) : { request: value };
   if (["trajectory", "legs", "map"].some((name) => name in cell.request))
-    throw new SyntaxError("It holds an answer: open the request instead.");
+    throw new SyntaxError("This is an answer: open its request instead.");
   if (!TASK.some((name) => name in cell.request))
-    throw new SyntaxError("It holds neither targets nor a robot.");
+    throw new SyntaxError("Neither targets nor a robot were found.");
   return cell;
 }
 
@@ -73,7 +73,7 @@ export async function shared(hash: string): Promise<{ cell?: Cell; answer?: stri
   } catch {
     throw new Problem({
       title: "The link is broken",
-      detail: "A part of it is missing: ask for it again. This is the example.",
+      detail: "A part of the link is missing: ask for it again. The example is shown instead.",
     });
   }
 }

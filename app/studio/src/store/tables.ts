@@ -62,7 +62,7 @@ export function parseTable(text: string, joints = 6): Table | { why: string } | 
     return refused(
       table[short]!,
       short,
-      `Numbers found: ${table[short]!.count}. Correct or delete it.`,
+      `Numbers found: ${table[short]!.count}. Correct or delete this row.`,
     );
   const [first] = rows;
   const units = first!.count === 0 ? unitsOf(lines[0]!) : "";

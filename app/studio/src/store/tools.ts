@@ -88,7 +88,7 @@ export function followTool(): void {
       })
       .catch((error) => {
         if (toolName(request.peek()) === name)
-          toolWhy.value = `The figures of this gripper did not come. ${said(error)}`;
+          toolWhy.value = `The figures of this gripper could not be loaded. ${said(error)}`;
       });
   });
 }

@@ -63,7 +63,7 @@ export function tell(error: unknown, asked: ApiRequest = request.value): void {
     };
   });
   const said = error instanceof Error ? error.message : String(error);
-  const text = fields.length ? "Correct what is marked." : asShown(said);
+  const text = fields.length ? "Correct the marked fields." : asShown(said);
   if (!fields.length)
     fields.push(...pointersOf(details, asked).map((pointer) => ({ pointer, text })));
   trouble.value = {

@@ -27,7 +27,7 @@ export function FiguresField() {
           edit(put(request.value, "/figures", event.currentTarget.value || undefined))
         }
       >
-        <option value="">of the type</option>
+        <option value="">of the robot type</option>
         {known?.map(({ id, created }) => (
           <option key={id} value={id}>
             yours, {when(created)}

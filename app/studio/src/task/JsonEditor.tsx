@@ -36,7 +36,7 @@ export function JsonEditor() {
       />
       {why && (
         <p class="error" role="alert" id="json-error">
-          This is no request. {why}
+          This is not a request. {why}
         </p>
       )}
     </div>

@@ -69,7 +69,7 @@ export function MoreFields() {
       <summary>
         <b>More</b>{" "}
         <small>
-          {set.length ? set.map(words).join(", ") : "limits, mounting, branches: all as usual"}
+          {set.length ? set.map(words).join(", ") : "limits, mounting, branches: defaults"}
         </small>
       </summary>
       <div class="fields">
@@ -88,9 +88,9 @@ export function MoreFields() {
         <BranchField />
         <Pick name="objective" options={["electrical", "mechanical"]} />
         <Pick name="method" options={METHODS} />
-        <Tick name="windings" text="full turns of joints count" />
-        <Tick name="collisions" text="collisions are checked" />
-        {field("deadline", "Time to compute", "/deadline", "s")}
+        <Tick name="windings" text="use full-turn alternatives" />
+        <Tick name="collisions" text="check collisions" />
+        {field("deadline", "Computing time", "/deadline", "s")}
       </div>
       {[
         "limits",
@@ -158,7 +158,7 @@ function Mount() {
 function Pick({ name, options }: { name: string; options: string[] }) {
   return (
     <label class="field">
-      <span>{name === "method" ? "Method" : "Least"}</span>
+      <span>{name === "method" ? "Method" : "Minimise"}</span>
       <select
         value={String(request.value[name] ?? options[0])}
         onChange={(event) =>

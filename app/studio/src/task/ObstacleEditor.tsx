@@ -63,7 +63,7 @@ export function ObstacleEditor({ pointer }: { pointer: Pointer }) {
       )}
       {"length" in given && given.length !== undefined && (
         <div class="field">
-          <span>Length, along its z</span>
+          <span>Length along z</span>
           {cell("Length", "length")}
         </div>
       )}
@@ -86,10 +86,10 @@ export function ObstacleEditor({ pointer }: { pointer: Pointer }) {
       )}
       <p class="hint">
         {given.shape === "half_space"
-          ? "A point of its surface; its z points out of it"
+          ? "A point of the surface, with z pointing outwards"
           : given.shape === "mesh_file"
             ? "The origin of the file, in the base frame"
-            : "Its middle, in the base frame"}
+            : "The centre, in the base frame"}
       </p>
       <PoseCells
         name={String(given.name)}

@@ -9,8 +9,8 @@ export function OverRating({ mass }: { mass: unknown }) {
   if (typeof mass !== "number" || typeof rated !== "number" || mass + tool <= rated) return null;
   return (
     <p class="warning-text">
-      {figure(mass + tool)} kg{tool > 0 && ", gripper included,"} is more than a{" "}
-      {robotNow.value?.title} may carry ({rated} kg).
+      {figure(mass + tool)} kg{tool > 0 && ", gripper included,"} exceeds the rated payload of the{" "}
+      {robotNow.value?.title} ({rated} kg).
     </p>
   );
 }

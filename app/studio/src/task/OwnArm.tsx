@@ -48,8 +48,8 @@ export function OwnArm({ onAdded }: { onAdded: (name: string) => void }) {
     const missing = [
       !urdf && { field: "urdf", text: "Choose the URDF file." },
       urdf && !tips.length && NO_LINK,
-      acceleration === null && { field: "acceleration", text: "Give a number, as 10." },
-      payload === null && { field: "payload", text: "Give a number of kg." },
+      acceleration === null && { field: "acceleration", text: "Enter a number, for example 10." },
+      payload === null && { field: "payload", text: "Enter a mass in kg." },
     ].filter((each) => each !== false && each !== "");
     setWhy(missing);
     if (missing.length) return;
@@ -96,7 +96,7 @@ export function OwnArm({ onAdded }: { onAdded: (name: string) => void }) {
         {said("urdf")}
       </label>
       <label>
-        Meshes that it names, as a zip{" "}
+        Its meshes, as a ZIP file{" "}
         <input
           type="file"
           accept=".zip"
@@ -112,7 +112,7 @@ export function OwnArm({ onAdded }: { onAdded: (name: string) => void }) {
         {said("name")}
       </label>
       <label>
-        Link at the end of the arm, the flange
+        Flange: the link at the end of the arm
         <select value={form.tip} onChange={set("tip")}>
           {tips.map((tip) => (
             <option key={tip}>{tip}</option>
@@ -143,8 +143,8 @@ export function OwnArm({ onAdded }: { onAdded: (name: string) => void }) {
           </p>
         ))}
       <p class="hint">
-        Figures that a URDF does not hold (friction, rotors, electronics) are engineering defaults
-        until logs of your arm tell them.
+        Figures that a URDF does not contain (friction, rotors, electronics) are engineering
+        defaults until you identify them from logs of your arm.
       </p>
       <Button kind="primary" disabled={busy} onClick={add}>
         Add the arm

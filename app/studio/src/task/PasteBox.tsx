@@ -33,7 +33,7 @@ export function PasteBox() {
       )}
       {asked && (
         <Note>
-          <b>How is this meant?</b>
+          <b>How should this be read?</b>
           <div class="readings" id="readings">
             {asked.choices.map((choice) => (
               <Button key={choice.echo} small onClick={() => answer(asked, choice)}>

@@ -15,13 +15,13 @@ const SHAPES = [
 
 const RAMP = 0.02; // default length of the ramps of a held speed [m]
 
-/** How the TCP goes along the path. */
+/** How the TCP moves along the path. */
 export function PathFields() {
   const shape = String(
     at(request.value, "/path/shape") ?? "lines",
   ) as (typeof SHAPES)[number]["value"];
   return (
-    <Section title="Along the path">
+    <Section title="Path">
       <Segment
         label="Shape of the path"
         options={SHAPES}
@@ -48,7 +48,7 @@ export function PathFields() {
   );
 }
 
-/** The largest speed of the TCP, and whether it is held, as for a bead of glue. */
+/** The largest speed of the TCP, and whether it is constant, for example for a bead of glue. */
 function Speed() {
   const given = at(request.value, "/path/speed") ?? undefined;
   const most = isObject(given) ? given.max : given;
@@ -64,7 +64,7 @@ function Speed() {
   return (
     <>
       <label class="field">
-        <span>TCP speed at most</span>
+        <span>Largest TCP speed</span>
         <input
           type="checkbox"
           aria-label="Limit the speed"
@@ -91,12 +91,12 @@ function Speed() {
             checked={held}
             onChange={(event) => set(most, event.currentTarget.checked)}
           />
-          <span>held all along, as for glue</span>
+          <span>constant speed, for example for glue</span>
         </label>
       )}
       {held && (
         <div class="field">
-          <span>reached, and left again, within</span>
+          <span>ramps at both ends</span>
           <NumberCell
             label="Ramp"
             pointer="/path/speed/ramp"

@@ -14,21 +14,21 @@ const SHAPES: Record<string, Shape> = {
 };
 const CENTRES = [
   { value: "even", text: "evenly filled" },
-  { value: "own", text: "own" },
+  { value: "own", text: "own centre" },
 ] as const;
 
 const sizesOf = ({ size, radius, length }: Shape): number[] =>
   Array.isArray(size) ? size : [radius, length].filter((each) => each !== undefined);
 
-/** What a part is by its shape and its centre, in a few words. */
+/** Shape and mass distribution of a part, in a few words. */
 function wordsOf({ com, inertia, shape }: Payload): string {
-  if (!shape) return inertia ? "its own inertia" : "a point";
+  if (!shape) return inertia ? "own inertia" : "point mass";
   const sizes = sizesOf(shape).map((each) => Number((each * 1000).toFixed(1)));
-  const filled = com || inertia ? "" : ", even";
+  const filled = com || inertia ? "" : ", evenly filled";
   return `${shape.shape} ${sizes.length ? `${sizes.join(" × ")} mm` : ""}${filled}`;
 }
 
-/** Shape and centre of mass of what is carried, at its place in the request. */
+/** Shape and centre of mass of the payload, at its place in the request. */
 export function PayloadFields({ pointer }: { pointer: Pointer }) {
   const payload = at(request.value, pointer) as Payload;
   const shape = isObject(payload.shape) ? (payload.shape as Shape) : null;
@@ -55,7 +55,7 @@ export function PayloadFields({ pointer }: { pointer: Pointer }) {
   return (
     <details class="fold payload-form">
       <summary>
-        <span class="fold-name">Form</span> <b>{wordsOf(payload)}</b>
+        <span class="fold-name">Shape</span> <b>{wordsOf(payload)}</b>
       </summary>
       <div class="field">
         <span>Shape</span>
@@ -82,13 +82,13 @@ export function PayloadFields({ pointer }: { pointer: Pointer }) {
             {"length" in shape && <>length {cell("Payload length", "shape/length")}</>}
           </div>
           <div class="field">
-            <span>Its middle at, mm</span>
-            {three("Payload middle", "shape/pose/position")}
+            <span>Centre of shape, mm</span>
+            {three("Payload centre", "shape/pose/position")}
           </div>
           <div class="field">
             <span>Mass</span>
             <Segment
-              label="Where the mass is"
+              label="Distribution of the mass"
               options={CENTRES}
               value={even ? "even" : "own"}
               onChange={(next) => set(next === "even" ? rest : { ...payload, com: centre() })}
@@ -106,8 +106,8 @@ export function PayloadFields({ pointer }: { pointer: Pointer }) {
         {even
           ? "Centre and inertia are computed from mass and size."
           : listOf(inertia).length
-            ? "Its inertia is that in JSON."
-            : "The mass counts as a point. Give its shape, and its inertia counts."}
+            ? "The inertia is set in the JSON."
+            : "The mass is a point mass. With a shape, its inertia is included."}
       </p>
     </details>
   );

@@ -93,7 +93,7 @@ function ReachText({ row, target }: { row: Row; target: Target }) {
   const free = reach.solutions.filter(({ collides }) => !collides).length;
   if (free)
     return (
-      <small class="hint" title="Postures that reach it without a collision">
+      <small class="hint" title="Postures that reach this pose without collision">
         {free} of {reach.solutions.length} {row.role === "stop" ? "" : "postures "}free
       </small>
     );
@@ -148,9 +148,9 @@ function Numbers({ row, target }: { row: Row; target: Target }) {
   };
   return (
     <div class="row">
-      <span class="hint">empty: paste below, or</span>
+      <span class="hint">Empty: paste a target below, or</span>
       <Button small onClick={() => empty("pose")}>
-        start from the picture
+        take it from the picture
       </Button>
     </div>
   );

@@ -23,11 +23,11 @@ export function RobotCard() {
           {typeof rated === "number" && ` · ${rated} kg payload`}
         </p>
         <p class="hint">
-          {own ? "Your own figures" : "Figures of the type"} ·{" "}
+          {own ? "Identified figures" : "Figures of the robot type"} ·{" "}
           <Button
             kind="link"
             onClick={() => (page.value = "logs")}
-            title="From logs of your own arm"
+            title="Identify figures from logs of your own arm"
           >
             {own ? "see your logs" : "use yours"}
           </Button>

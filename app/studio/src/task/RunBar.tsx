@@ -9,9 +9,9 @@ import { figure } from "../store/units";
 
 /** Why the request cannot be sent, or null. */
 function obstacle(): string | null {
-  if (jsonBroken.value) return "The JSON is no request.";
+  if (jsonBroken.value) return "The JSON is not a request.";
   const [cell] = Object.values(unread.value);
-  if (cell !== undefined) return `Enter a number: ${cell}.`;
+  if (cell !== undefined) return `Enter a number for ${cell}.`;
   return lackOf(request.value)?.text ?? null;
 }
 
@@ -56,11 +56,11 @@ function stateText(): string {
   if (count) return `${count} ${count === 1 ? "change" : "changes"} since the last answer`;
   const took = answered.value?.took;
   if (answered.value)
-    return `The answer belongs to this request${took ? ` · took ${figure(took, 2)} s` : ""}`;
+    return `The answer is up to date${took ? ` · took ${figure(took, 2)} s` : ""}`;
   return "Not computed yet";
 }
 
-/** What went wrong; it also stands at its fields. */
+/** What went wrong; it is also shown at its fields. */
 function Wrong() {
   const now = trouble.value;
   if (!now || page.value !== "cell") return null;

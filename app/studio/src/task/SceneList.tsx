@@ -50,7 +50,8 @@ export function SceneList() {
     setWhy("");
     const bytes = new Uint8Array(await file.arrayBuffer());
     const extent = await extentOf(format!, bytes).catch(() => null);
-    if (!extent) return setWhy(`${file.name} is no ${format!.toUpperCase()} file with triangles.`);
+    if (!extent)
+      return setWhy(`${file.name} contains no triangles in the format ${format!.toUpperCase()}.`);
     const scale = likelyUnit(extent);
     edit(
       withObstacle(

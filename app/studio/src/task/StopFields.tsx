@@ -11,8 +11,8 @@ import { PayloadFields } from "./PayloadFields";
 type Deed = "same" | "takes" | "puts" | "passes";
 
 const DEEDS = [
-  { value: "same", text: "stands" },
-  { value: "takes", text: "takes" },
+  { value: "same", text: "rests" },
+  { value: "takes", text: "picks up" },
   { value: "puts", text: "puts down" },
   { value: "passes", text: "passes" },
 ] as const;
@@ -36,7 +36,7 @@ function withDeed(stop: Stop, deed: Deed): Stop {
 export function deedText(stop: unknown): string {
   if (!isObject(stop)) return "";
   const deed = deedOf(stop as Stop);
-  if (deed === "takes") return `takes ${(stop as Stop).payload?.mass ?? "?"} kg`;
+  if (deed === "takes") return `picks up ${(stop as Stop).payload?.mass ?? "?"} kg`;
   return deed === "puts" ? "puts down" : deed === "passes" ? "passes" : "";
 }
 
@@ -62,7 +62,7 @@ export function StopFields({ pointer }: { pointer: Pointer }) {
           checked={given}
           onChange={(event) => set(event.currentTarget.checked)}
         />
-        <span>straight {field === "approach" ? "in" : "out"}, along the tool</span>
+        <span>straight {field} along the tool</span>
         {given && (
           <NumberCell
             label={field}
@@ -86,7 +86,7 @@ export function StopFields({ pointer }: { pointer: Pointer }) {
       {deed === "takes" && (
         <>
           <div class="field">
-            <span>what weighs</span>
+            <span>mass</span>
             <NumberCell
               label="Payload mass"
               pointer={`${pointer}/payload/mass`}
@@ -102,7 +102,7 @@ export function StopFields({ pointer }: { pointer: Pointer }) {
       {deed !== "passes" && (
         <>
           <div class="field">
-            <span>stands for</span>
+            <span>dwell</span>
             <NumberCell
               label="Dwell"
               pointer={`${pointer}/dwell`}

@@ -39,13 +39,13 @@ export function TargetTable() {
       <PasteBox />
       <div class="row">
         <Button kind="link" icon="plus" onClick={add}>
-          {path ? "Add a pose on the way" : "Add a stop"}
+          {path ? "Add a via pose" : "Add a stop"}
         </Button>
         <Button
           kind="link"
           icon="target"
           onClick={takePose}
-          title="Where the arm stands in the picture now"
+          title="Use the current pose of the arm in the picture"
         >
           Take from the picture
         </Button>
@@ -59,7 +59,7 @@ export function TargetTable() {
           Drag
         </Button>
       </div>
-      {kind.value === "move" && <p class="hint">With a stop, the move becomes a cycle.</p>}
+      {kind.value === "move" && <p class="hint">A stop turns the move into a cycle.</p>}
       <Errors under="/stops" except={rows.map(({ pointer }) => pointer.replace(/\/target$/, ""))} />
     </Section>
   );

@@ -98,7 +98,7 @@ function Every() {
     <span class="every">
       one {kind.value === "cycle" ? "cycle" : "move"} every{" "}
       <PlainNumber
-        label="One move every so many seconds"
+        label="Time per move or cycle"
         unit="s"
         value={economics.value.cycleTime}
         least="above zero"

@@ -63,7 +63,7 @@ export function ToolPayload() {
             ? String(at(asked, "/payload/shape/shape"))
             : mass
               ? "no shape"
-              : "nothing carried"}
+              : "no payload"}
         </small>
       </div>
       <OverRating mass={mass} />

@@ -34,7 +34,7 @@ export function ToolPicker() {
           value={name ?? ""}
           onChange={(event) => choose(event.currentTarget.value)}
         >
-          <option value="">none of these: own TCP and shape</option>
+          <option value="">other: own TCP and shape</option>
           {tools.value?.map((each) => (
             <option key={each.name} value={each.name}>
               {each.title}
@@ -65,8 +65,8 @@ function Figures() {
   return (
     <p class="hint" id="tool-figures">
       {figure(mass.value as number)} kg {letter(mass)}, TCP {letter(tcp)}, shape of{" "}
-      {(capsules.value as unknown[]).length} capsules {letter(capsules)}. The payload is the part
-      alone.
+      {(capsules.value as unknown[]).length} capsules {letter(capsules)}. The payload does not
+      include the gripper.
     </p>
   );
 }

@@ -78,7 +78,7 @@ export function Choices({ label, name, choices, current, onChoose }: Props) {
         onKeyDown={onKey}
       />
       <p class="hint" role="status">
-        {shown.length ? "" : "None has this name."}
+        {shown.length ? "" : "No entry has this name."}
       </p>
       <ul class="choices" role="listbox" id={id} aria-label={name} ref={list}>
         {shown.map(({ value, title, facts, note }, k) => (

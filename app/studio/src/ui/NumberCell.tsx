@@ -81,7 +81,7 @@ export function NumberCell({ label, pointer, value, unit, onValue, onPaste, with
       {withUnit && sign && <small>{sign}</small>}
       {isWrong && (
         <small class="error" role="alert">
-          No number
+          Not a number
         </small>
       )}
     </span>

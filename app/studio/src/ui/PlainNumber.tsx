@@ -40,7 +40,7 @@ export function PlainNumber({ label, unit, value, least, empty, onValue }: Props
       {wrong !== null && (
         <small class="error" role="alert">
           Enter a number {least === "zero" ? "of at least 0" : "above 0"}
-          {value === null ? "." : `; until then ${value} counts.`}
+          {value === null ? "." : `; until then, ${value} is used.`}
         </small>
       )}
     </>

@@ -21,8 +21,8 @@ function than(
 ): string {
   if (endpoint === "placement") return `${done} of ${total} places`;
   return bound > 0
-    ? `at least ${figure(bound)} J: at most ${atMost(energy / bound - 1)} above the least possible`
-    : "no bound yet";
+    ? `at most ${atMost(energy / bound - 1)} above the lower bound of ${figure(bound)} J`
+    : "no lower bound yet";
 }
 
 /** How far what is computed now is, and the button that ends it. */
