@@ -228,7 +228,8 @@ class Division:
             for _ in range(self.settings.trials):
                 turned = normal + spread * self.rng.normal(size=3)
                 turned /= np.linalg.norm(turned)
-                attempt(turned, middle @ turned + spread * self.settings.shift * self.rng.normal())
+                shift = spread * self.settings.shift * self.rng.normal()
+                attempt(turned, float(middle @ turned) + shift)
         if best is None or best[0] > (1 - self.settings.gain) * self.cost(part, others):
             return None
         return self._sides(part.triangles, *best[1:])

@@ -10,7 +10,7 @@ import weakref
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
@@ -97,13 +97,14 @@ class _Mapped(KernelEvaluation):
     """CasADi function mapped over the nodes."""
 
     def __init__(self, mapped: ca.Function) -> None:
+        self._buffer: Any
         self._buffer, self.run = mapped.buffer()
         self.arguments = [np.zeros(mapped.size_in(i)[::-1]) for i in range(mapped.n_in())]
         self.results = [np.zeros(mapped.size_out(i)[::-1]) for i in range(mapped.n_out())]
         for i, array in enumerate(self.arguments):
-            self._buffer.set_arg(i, memoryview(array))  # type: ignore[call-arg, arg-type]
+            self._buffer.set_arg(i, array.data)
         for i, array in enumerate(self.results):
-            self._buffer.set_res(i, memoryview(array))  # type: ignore[call-arg, arg-type]
+            self._buffer.set_res(i, array.data)
 
 
 class _Called(KernelEvaluation):

@@ -94,7 +94,7 @@ def _is_known(cycle: Cycle) -> bool:
         and all(move.tool_path is None for move in cycle.moves)
         and all(len(to) <= BOX_BOUND.most_targets for to in targets)
         and all(isinstance(each, Pose | np.ndarray) for to in targets for each in to)
-        and min(law.coulomb.min(), law.curved.min(), law.viscous.min()) >= 0
+        and bool(min(law.coulomb.min(), law.curved.min(), law.viscous.min()) >= 0)
     )
 
 

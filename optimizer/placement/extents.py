@@ -24,8 +24,8 @@ class Extent:
     def around(cls, extents: Sequence[Extent]) -> Extent:
         """The smallest box around several."""
         return cls(
-            np.min([each.low for each in extents], axis=0),
-            np.max([each.high for each in extents], axis=0),
+            np.stack([each.low for each in extents]).min(axis=0),
+            np.stack([each.high for each in extents]).max(axis=0),
         )
 
     def along(self, direction: Array) -> tuple[float, float]:

@@ -107,7 +107,7 @@ def outcome(arm: Arm, motion: Reference, played: Played, planned: PlannedMotion)
         end_error=float(deviation[-1]),
         peak_torque=np.abs(played.tau_motor).max(axis=0),
         limit_ratio=np.abs(limited).max(axis=0) / arm.active_limits.tau_max,
-        saturated=played.saturated.sum(axis=0) * played.step,
+        saturated=played.step * played.saturated.sum(axis=0, dtype=float),
         energy=energy,
     )
 
