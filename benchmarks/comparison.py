@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from joulepath.models.robot import Array
 
@@ -165,6 +164,9 @@ def draw(planners: Comparison, path: Path) -> None:
     """Plots every task as a dot, and the medians with quartiles; the marker of a planner that
     violates limits is hollow.
     """
+    # imported late: other users of this module draw nothing
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(9, 6), layout="constrained")
     axes = figure.subplots()
     colours = iter(COLOURS)

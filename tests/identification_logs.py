@@ -12,13 +12,19 @@ from typing import Literal
 
 import numpy as np
 
-from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.identify.identify import Identification
-from joulepath.optimizer.identify.logs.log import EffortMeaning, Log, LogMove
-from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.results import PowerErrors, TorqueErrors, Validation
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.robots import load_robot
+from joulepath import (
+    Identification,
+    IdentificationOptions,
+    Log,
+    LogMove,
+    Payload,
+    Robot,
+    Validation,
+    load_robot,
+)
+from joulepath.models.robot import Array
+from joulepath.optimizer.identify.logs.log import EffortMeaning
+from joulepath.optimizer.identify.results import PowerErrors, TorqueErrors
 from tests.by_pinocchio import torques_of
 
 GRAVITY = np.array([0.0, 0.0, -9.81])

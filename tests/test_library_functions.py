@@ -47,16 +47,6 @@ def electrical(energy: joulepath.Energy) -> float:
     return energy.electrical.total
 
 
-def test_optimize() -> None:
-    """The README's use: from joints to joints, with the defaults for everything else."""
-    found = solution()
-    assert isinstance(found, joulepath.Solution)
-    assert found.certificate.valid
-    assert found.trajectory.q[0] == pytest.approx(START)
-    assert found.trajectory.q[-1] == pytest.approx(GOAL)
-    assert 0 < found.lower_bound <= electrical(found.energy)
-
-
 def test_optimize_many() -> None:
     """The caller brings the executor; a problem without a solution does not end the others."""
     far = joulepath.Pose.from_rotvec([3.0, 0.0, 0.0], [np.pi, 0.0, 0.0])
@@ -119,23 +109,6 @@ def test_compare_refuses_methods_that_are_none(methods: list[typing.Any]) -> Non
     assert caught.value.field == "methods"
 
 
-def test_what_if() -> None:
-    heavier = replace(problem().arm, payload=joulepath.Payload(mass=3.0))
-    found = joulepath.what_if(solution(), replace(problem(), arm=heavier))
-    given = joulepath.evaluate(heavier, solution()).total.energy
-    assert electrical(found.same_motion) == pytest.approx(electrical(given), rel=1e-4)
-    assert found.reoptimised is not None
-    if found.certificate.valid:
-        assert electrical(found.reoptimised.energy) <= electrical(found.same_motion)
-
-
-def test_plan_cycle() -> None:
-    found = cycle_solution()
-    assert found.order == ["pick", "place"] and len(found.moves) == 3
-    assert found.joins < 1e-6
-    assert 0 < found.lower_bound <= electrical(found.energy)
-
-
 def test_inverse_kinematics() -> None:
     """The goal of an optimised motion is among the solutions; a scene marks colliding solutions."""
     pose = joulepath.Pose.from_rotvec([0.4, -0.2, 0.3], [np.pi, 0.0, 0.0])
@@ -171,21 +144,6 @@ def test_what_is_too_late_says_so() -> None:
         joulepath.replay(solution(), deadline=0.5, problem=problem(), **late)
     with pytest.raises(joulepath.DeadlineExceeded):
         joulepath.compare(replace(problem(), deadline=0.5), ["uniform_scaling", "bspline"], **late)
-
-
-def test_replay() -> None:
-    found = joulepath.replay(
-        solution(), ("feed_forward",), 1e-3, {"friction": 0.3}, problem=problem()
-    )
-    assert found.torque_error is not None and found.torque_error < 1e-9
-    run = found.under("feed_forward")
-    assert electrical(run.energy) == pytest.approx(electrical(solution().energy), rel=5e-3)
-    assert not run.collides
-    # baselines within the limits with the same duration, above all the straight motion
-    names = {each.name for each in found.savings}
-    assert {"ruckig_slowed", "straight"} <= names <= {each.name for each in solution().baselines}
-    for each in found.savings:
-        assert each.simulated == pytest.approx(each.planned, abs=5e-3)
 
 
 def test_replay_of_a_cycle_plays_every_move() -> None:

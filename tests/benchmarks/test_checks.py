@@ -9,7 +9,7 @@ import numpy as np
 import orjson
 import pytest
 
-from benchmarks.checks import allowed, beats, errors_found, refusal_errors
+from benchmarks.checks import beats, errors_found, refusal_errors
 from benchmarks.motion import SplineMotion, replay
 from benchmarks.tasks import RequestTask, request_task
 from joulepath import load_robot, optimize
@@ -115,12 +115,6 @@ def test_a_baseline_of_a_duration_that_was_not_allowed_does_not_count(answered: 
     assert beats({}, answer, baseline)
     assert not beats({"duration": answer["duration"]}, answer, baseline)
     assert not beats({"duration": {"max": 1.5 * answer["duration"]}}, answer, baseline)
-
-
-def test_allowed_durations() -> None:
-    assert allowed(None) == (0.0, np.inf)
-    assert allowed({"max": 3.0}) == (0.0, 3.0)
-    assert allowed(2.0) == (2.0, 2.0)
 
 
 def test_replay_agrees_with_the_certificate(task: RequestTask, answered: Json) -> None:

@@ -121,8 +121,3 @@ def test_every_planner_takes_time_for_every_task(workers: list[Worker]) -> None:
     walls = measured(workers[0], workers[1:], 2, 1)
     assert walls.shape == (2, 2)
     assert (walls > 0).all()
-
-
-def test_a_planner_that_cannot_be_made_is_told() -> None:
-    with pytest.raises(RuntimeError, match="make bench"):
-        Worker("nobody", 0, 1)

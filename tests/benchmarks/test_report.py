@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.energies import RELATIVE, differences
 from benchmarks.reference import fingerprint, load
-from benchmarks.requirements import Requirement, requirements
+from benchmarks.requirements import Requirement
 from joulepath.optimizer.problem.robots import load_robot
 
 ROW = {
@@ -40,15 +40,6 @@ def test_a_requirement_is_satisfied_up_to_its_bound(
         Requirement("task", "quantity [1]", "maximum", measured, 1.0, at_least).satisfied
         is satisfied
     )
-
-
-def test_a_row_has_one_value_per_column() -> None:
-    row = Requirement("one candidate", "time [ms]", "median", 12.34, 10, digits=1).row()
-    assert row == ["one candidate", "time [ms]", "median", "≤ 10", "12.3", "**no**"]
-
-
-def test_sections_without_results_have_no_requirements() -> None:
-    assert requirements({"solver": None}) == []
 
 
 @pytest.mark.parametrize(

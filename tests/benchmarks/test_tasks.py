@@ -3,7 +3,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.statistics import Spread
 from benchmarks.tasks import KINDS, flange, move, moves, request_task, request_tasks
 from joulepath import Robot, load_robot
 from joulepath.app.convert.request import to_problem
@@ -47,14 +46,3 @@ def test_requests_are_valid_and_reachable(robot: Robot, index: int) -> None:
         reached = flange(robot, target) if isinstance(target, np.ndarray) else target.T
         assert np.abs(reached - T).max() < POSE_ERROR
         assert inverse_kinematics_for(robot).branches(T)
-
-
-def test_spread() -> None:
-    spread = Spread.of([1.0, 2.0, 3.0, 4.0, 10.0])
-    assert (spread.count, spread.minimum, spread.p50, spread.maximum) == (5, 1.0, 3.0, 10.0)
-    assert spread.times(1e3).p50 == 3000.0 and spread.times(1e3).count == 5
-    assert Spread.of([]).count == 0
-    unbounded = Spread.of([0.1, 0.2, 0.3, np.inf, np.inf])
-    assert (unbounded.minimum, unbounded.p25, unbounded.p50) == (0.1, 0.2, 0.3)
-    assert unbounded.p75 == unbounded.p90 == unbounded.maximum == np.inf
-    assert Spread.of([1.0, np.inf]).p75 == np.inf

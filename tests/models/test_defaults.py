@@ -7,11 +7,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from joulepath import Robot, load_robot, robot_names
 from joulepath.models.capsule_cover import outside
 from joulepath.models.meshes import link_surfaces
-from joulepath.models.registry import robot_names
-from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.problem.robots import load_robot
+from joulepath.models.robot import Array
 from tests.mesh_folders import FOUND, meshes
 from tests.selection import ROBOTS
 

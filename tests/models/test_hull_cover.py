@@ -15,14 +15,13 @@ import pytest
 from pinocchio.rpy import rpyToMatrix
 from scipy.spatial import ConvexHull, cKDTree
 
+from joulepath import load_robot, robot_names
 from joulepath.models.capsule_cover import TURNS, not_held, outside, turned_into
 from joulepath.models.fit_hulls import fitted_hulls
 from joulepath.models.hull_cover import HULL_FIT, from_hull, hull_around
 from joulepath.models.hull_parts import PARTS, Rim, below, divided, nowhere
 from joulepath.models.meshes import KINDS, link_surfaces, sampled
-from joulepath.models.registry import robot_names
 from joulepath.models.robot import Array, LinkHull, Mask
-from joulepath.optimizer.problem.robots import load_robot
 from tests.mesh_folders import FOUND, meshes
 from tests.selection import long_but
 

@@ -12,9 +12,17 @@ import numpy as np
 import pytest
 import yaml
 
-from joulepath import Arm, Pose, Problem, Solution, evaluate, inverse_kinematics, load_robot
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.result.candidates import CandidateReport
+from joulepath import (
+    Arm,
+    CandidateReport,
+    Pose,
+    Problem,
+    Solution,
+    evaluate,
+    inverse_kinematics,
+    load_robot,
+    optimize,
+)
 
 HOME = np.radians([0.0, -90, 90, -90, 180, 0])
 SHELF = np.radians([60.0, -70, 60, -80, 90, 0])

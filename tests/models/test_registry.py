@@ -14,13 +14,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from joulepath import Robot, UnknownRobot, load_robot, robot_names
 from joulepath.models import registry
-from joulepath.models.registry import load_figures, robot_names
-from joulepath.models.robot import Array, Robot
+from joulepath.models.registry import load_figures
+from joulepath.models.robot import Array
 from joulepath.models.trust import energy_trust
 from joulepath.models.urdf import urdf_of
-from joulepath.optimizer.exceptions import UnknownRobot
-from joulepath.optimizer.problem.robots import load_robot
 from tests.by_pinocchio import flange
 from tests.mesh_folders import SHIPPED
 from tests.mesh_folders import meshes as arm_folder

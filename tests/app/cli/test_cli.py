@@ -50,12 +50,6 @@ def test_an_invalid_request_is_a_validation_problem(
     assert [error["loc"] for error in content["errors"]] == [loc]
 
 
-def test_an_unknown_robot_is_answered_with_the_known_ones(here: Here) -> None:
-    code, content = here.problem("optimize", "-", stdin=request(robot="r2d2"))
-    assert (code, content["type"]) == (2, "/problems/unknown-robot")
-    assert "ur5e" in content["known"]
-
-
 def test_a_valid_request_without_a_motion_exits_with_1(here: Here) -> None:
     code, content = here.problem("optimize", "-", stdin=request(limits={"torque": 1.0}))
     assert (code, content["type"]) == (1, "/problems/torque-infeasible")
@@ -165,18 +159,25 @@ def test_robots_are_listed_with_their_trust() -> None:
         "serve",
         "optimize",
         "cycle",
+        "compare",
         "evaluate",
+        "excitation",
+        "ik",
+        "jobs",
+        "pareto",
         "replay",
         "robots",
         "robots add",
         "robots remove",
+        "whatif",
     ],
 )
-def test_every_help_has_an_example(here: Here, command: str) -> None:
+def test_every_help_has_an_example_that_exists(here: Here, command: str) -> None:
     code, out, _ = here.run(*command.split(), "--help")
     assert code == 0
     text = out.decode()
     assert re.search(rf"Examples?:\n\s+(echo .*\n.*)?(\S.*)?joulepath {command}", text)
+    assert all((ROOT / file).is_file() for file in re.findall(r"examples/\S+\.json", text))
     if not command:
         assert all(
             re.search(rf"^\s+{code}  \S", text, re.MULTILINE) for code in (0, 1, 2, 130, 141)

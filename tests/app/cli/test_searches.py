@@ -16,7 +16,7 @@ from joulepath.app.api.compare.task import CompareAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.api.whatif.answer import WhatifAnswer
 from joulepath.app.cli import ik, searches
-from tests.app.cli.console import ROOT, Here, request
+from tests.app.cli.console import Here, request
 from tests.app.cli.test_terminal import on_a_terminal
 from tests.app.requests import HOME, NEAR, move
 
@@ -218,11 +218,3 @@ def test_a_terminal_shows_what_to_do() -> None:
     text = plain(shown)
     assert text.startswith("Unreachable pose: ")
     assert "Check that `position` is in metres" in text
-
-
-@pytest.mark.parametrize("name", ["compare", "excitation", "ik", "jobs", "pareto", "whatif"])
-def test_every_help_has_an_example_that_exists(here: Here, name: str) -> None:
-    code, out, _ = here.run(name, "--help")
-    text = out.decode()
-    assert code == 0 and re.search(rf"Examples?:\n\s+joulepath {name}", text)
-    assert all((ROOT / file).is_file() for file in re.findall(r"examples/\S+\.json", text))

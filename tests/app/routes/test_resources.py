@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import load_robot, robot_names
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.ik.task import IKAnswer
 from joulepath.app.api.robots.models import RobotDetail, RobotList
 from joulepath.app.convert.pose import to_matrix
 from joulepath.app.schemas.common import QuaternionPose
-from joulepath.models.registry import robot_names
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
-from joulepath.optimizer.problem.robots import load_robot
 from tests.app.requests import PATIENT
 
 IK: Any = model_of(IKAnswer)

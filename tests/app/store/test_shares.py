@@ -98,14 +98,6 @@ async def test_a_client_with_an_equal_share_loses_no_answer(store: Store) -> Non
     assert len(left) < sum(map(len, owned.values()))
 
 
-async def test_clients_choose_their_keys_independently(store: Store) -> None:
-    first = await queue(store, 2, "press", key="night")
-    other = await queue(store, 3, "cell", key="night")
-    assert other != first
-    assert await queue(store, 2, "press", key="night") == first
-    assert await queue(store, 3, "cell", key="night") == other
-
-
 def test_keys_of_an_earlier_version_become_those_of_their_clients(url: str) -> None:
     engine = create_database_engine(url)
     migrate_to(engine, "owners_of_requests")

@@ -10,17 +10,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath import Arm, Problem, optimize
+from joulepath import Arm, InvalidArm, Problem, load_robot, optimize
 from joulepath.app.schemas.examples.own_arm import URDF
 from joulepath.models.from_figures import robot_of
-from joulepath.models.own_arm.description import (
-    Collision,
-    Description,
-    Drives,
-    Electronics,
-    InvalidArm,
-    Motion,
-)
+from joulepath.models.own_arm.description import Collision, Description, Drives, Electronics, Motion
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.registry import load_figures
 from joulepath.models.robot import Array
@@ -28,7 +21,6 @@ from joulepath.models.trust import energy_trust
 from joulepath.models.urdf import urdf_of
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
-from joulepath.optimizer.problem.robots import load_robot
 from tests.mesh_folders import meshes as arm_folder
 from tests.models.own_arm.arms import AMPLE, HELD, PLAIN, RICH, RICH_ARM, refused, robot, whole
 

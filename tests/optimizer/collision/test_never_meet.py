@@ -28,14 +28,13 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from joulepath import Robot, load_robot, robot_names
 from joulepath.models.capsule_cover import cut
 from joulepath.models.meshes import link_surfaces
-from joulepath.models.registry import robot_names
-from joulepath.models.robot import Array, LinkCapsule, Robot
+from joulepath.models.robot import Array, LinkCapsule
 from joulepath.optimizer.collision.coal_distance import coal_shape
 from joulepath.optimizer.collision.cores import Core
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
-from joulepath.optimizer.problem.robots import load_robot
 from tests.mesh_folders import FOUND, meshes
 from tests.selection import long_but
 

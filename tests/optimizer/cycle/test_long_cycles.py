@@ -10,12 +10,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from joulepath import BranchFilter, Cycle, CycleSolution, Improved, Payload, plan_cycle
+from joulepath import Arm, BranchFilter, Cycle, CycleSolution, Improved, Payload, plan_cycle
 from joulepath.optimizer import surroundings
 from joulepath.optimizer.collision.model import CollisionModel, collision_model
 from joulepath.optimizer.cycle import cycle_search, legs
 from joulepath.optimizer.cycle.cycle_search import CYCLE_SEARCH, CycleSearch
-from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.progress import Event
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.cycle.cycles import PART, pick_and_place

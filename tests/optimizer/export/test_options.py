@@ -5,6 +5,7 @@ import pytest
 
 from joulepath import (
     FrankaOptions,
+    InvalidProblem,
     KrlOptions,
     LimitsOptions,
     McapOptions,
@@ -14,7 +15,6 @@ from joulepath import (
     TableOptions,
     UrscriptOptions,
 )
-from joulepath.optimizer.exceptions import InvalidProblem
 
 
 @pytest.mark.parametrize(

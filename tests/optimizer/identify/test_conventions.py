@@ -16,17 +16,21 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
+from joulepath import (
+    Identification,
+    IdentificationOptions,
+    Log,
+    LogOptions,
+    Payload,
+    Robot,
+    Validation,
+    identify,
+    read_log,
+)
 from joulepath.models.own_arm.description import Description, Drives, Electronics
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.robots import own_robot
-from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.identify.identify import Identification, identify
-from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.log_options import LogOptions
-from joulepath.optimizer.identify.logs.reading import read_log
-from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.results import Validation
-from joulepath.optimizer.problem.arm import Payload
+from joulepath.models.robot import Array
 from tests.by_pinocchio import torques_of
 from tests.identification_logs import GRAVITY, WITHOUT_SPLIT, Recording, recorded, truth_of
 from tests.selection import long_but

@@ -9,14 +9,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from joulepath import Arm, IdentificationOptions, Log, evaluate, identify, load_robot, read_log
 from joulepath.models.robot import Array
-from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.identify.identify import identify
-from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.reading import read_log
-from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import WITHOUT_SPLIT, recorded, truth_of
 
 RATE = 125.0

@@ -7,16 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.errors import EffortNotUsable
-from joulepath.optimizer.identify.identify import identify
-from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.log_options import LogOptions
-from joulepath.optimizer.identify.logs.reading import LogReading, read_log
+from joulepath import (
+    Arm,
+    EffortNotUsable,
+    IdentificationOptions,
+    InvalidProblem,
+    Log,
+    LogOptions,
+    LogReading,
+    Payload,
+    identify,
+    load_robot,
+    read_log,
+)
 from joulepath.optimizer.identify.logs.recorded import measured
-from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import FAR, WITHOUT_SPLIT, csv_of, recorded, truth_of, with_current
 from tests.selection import long_but
 

@@ -7,21 +7,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.errors import (
+from joulepath import (
     EffortNotUsable,
+    Identification,
+    IdentificationOptions,
+    InvalidProblem,
+    Log,
+    LogMove,
     MethodNotApplicable,
     NoPowerChannel,
     NotExcited,
     NothingHeldOut,
+    Payload,
+    identify,
+    load_robot,
 )
-from joulepath.optimizer.identify.identify import Identification, identify
-from joulepath.optimizer.identify.logs.log import Log, LogMove
-from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.models.robot import Array
 from joulepath.optimizer.identify.quality import validation as validation_module
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import (
     FAR,
     GRAVITY,

@@ -10,17 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.models.robot import Robot
+from joulepath import IdentificationOptions, JoulepathError, Log, Robot, identify, load_robot
 from joulepath.models.uncertainty.document import covariance_of
-from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.identify.choices import Method
 from joulepath.optimizer.identify.fits.determined import DETERMINED, NOT_TOLD, remarks_of
 from joulepath.optimizer.identify.fits.own_ranges import own_deviations
 from joulepath.optimizer.identify.fits.torque_fit import by_held_values
-from joulepath.optimizer.identify.identify import identify
-from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import WITHOUT_SPLIT, Noise, recorded, truth_of, written
 from tests.selection import long_but
 

@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.robot import Array, Robot
+from joulepath import IdentificationOptions, Robot, identify, load_robot
+from joulepath.models.robot import Array
 from joulepath.models.uncertainty.document import covariance_of
 from joulepath.models.uncertainty.parameters import LINKS
 from joulepath.optimizer.dynamics.link_regressor import (
@@ -19,9 +20,6 @@ from joulepath.optimizer.dynamics.link_regressor import (
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
 from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric, pseudo_inertias
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
-from joulepath.optimizer.identify.identify import identify
-from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import recorded, torque_errors, truth_of
 from tests.impossible_links import with_impossible_link
 from tests.selection import ROBOTS

@@ -9,19 +9,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from joulepath import (
+    Arm,
+    Dwell,
+    InvalidFigures,
+    InvalidProblem,
+    Log,
+    LogMove,
+    Robot,
+    evaluate,
+    identify,
+    load_robot,
+)
 from joulepath.models.from_figures import robot_of
-from joulepath.models.robot import Array, Mains, Robot
-from joulepath.models.uncertainty.document import InvalidFigures
+from joulepath.models.robot import Array, Mains
 from joulepath.models.uncertainty.parameters import index
 from joulepath.models.uncertainty.spread import spread_of
 from joulepath.optimizer.dynamics.dwell import with_dwell
-from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.identify import identify
-from joulepath.optimizer.identify.logs.log import Log, LogMove
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import (
     WITHOUT_SPLIT,
     Truth,

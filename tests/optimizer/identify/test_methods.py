@@ -9,6 +9,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from joulepath import (
+    Identification,
+    IdentificationOptions,
+    Log,
+    LogMove,
+    MethodNotApplicable,
+    Payload,
+    identify,
+    load_robot,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.link_regressor import (
     base_wrench_regressor,
@@ -18,13 +28,7 @@ from joulepath.optimizer.dynamics.link_regressor import (
 )
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
 from joulepath.optimizer.identify.choices import Term
-from joulepath.optimizer.identify.errors import MethodNotApplicable
 from joulepath.optimizer.identify.fits.threshold import velocity_threshold
-from joulepath.optimizer.identify.identify import Identification, identify
-from joulepath.optimizer.identify.logs.log import Log, LogMove
-from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import FAR, WITHOUT_SPLIT, Truth, recorded, torque_errors, truth_of
 
 ROBOT = load_robot("ur5e")

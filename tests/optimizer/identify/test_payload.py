@@ -7,14 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.errors import NotExcited, PayloadUnknown
+from joulepath import (
+    IdentificationOptions,
+    InvalidProblem,
+    Log,
+    NotExcited,
+    Payload,
+    PayloadUnknown,
+    identify,
+    load_robot,
+)
 from joulepath.optimizer.identify.fits.payload_fit import IdentifiedPayload
-from joulepath.optimizer.identify.identify import identify
-from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import FAR, Noise, recorded, torque_errors, truth_of
 from tests.selection import long_but
 

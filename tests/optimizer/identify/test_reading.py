@@ -11,14 +11,18 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
-from joulepath.optimizer.identify.errors import EffortNotUsable, LogTooLarge
+from joulepath import (
+    EffortNotUsable,
+    InvalidProblem,
+    InvalidTable,
+    Log,
+    LogOptions,
+    LogTooLarge,
+    Payload,
+    load_robot,
+    read_log,
+)
 from joulepath.optimizer.identify.logs.grid import grid_of
-from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.log_options import LogOptions
-from joulepath.optimizer.identify.logs.reading import read_log
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import (
     SILENT,
     Form,

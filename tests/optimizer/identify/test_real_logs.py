@@ -9,8 +9,7 @@ import pytest
 
 from benchmarks.identification import tx40_torque
 from benchmarks.identification_logs import ur3e
-from joulepath.optimizer.identify.identify import identify
-from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath import IdentificationOptions, identify
 from tests.identification_logs import power_errors, torque_errors
 
 

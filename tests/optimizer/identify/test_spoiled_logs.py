@@ -9,12 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from joulepath import EffortNotUsable, InvalidTable, LogOptions, load_robot, read_log
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.errors import EffortNotUsable
-from joulepath.optimizer.identify.logs.log_options import LogOptions
-from joulepath.optimizer.identify.logs.reading import read_log
-from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import Recording, csv_of, recorded, truth_of, with_current
 
 ROBOT = load_robot("ur10e")

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from joulepath import InvalidFigures, identify, load_robot
 from joulepath.models.robot import Array
-from joulepath.models.uncertainty.document import InvalidFigures
 from joulepath.models.uncertainty.parameters import place
 from joulepath.models.uncertainty.spread import spread_of as drawn
 from joulepath.optimizer.identify.estimates.grouped import (
@@ -19,9 +19,7 @@ from joulepath.optimizer.identify.estimates.grouped import (
     leave_one_out,
     residual_replicates,
 )
-from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.quality.interval import INTERVAL, own_variance, session_sd
-from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import WITHOUT_SPLIT, off_the_model, recorded, truth_of
 
 GROUPS, SIZE = 12, 30

@@ -7,18 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.errors import MethodNotApplicable
-from joulepath.optimizer.identify.identify import identify
-from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.log_options import LogOptions
-from joulepath.optimizer.identify.logs.reading import read_log
+from joulepath import (
+    Arm,
+    IdentificationOptions,
+    InvalidProblem,
+    Log,
+    LogOptions,
+    MethodNotApplicable,
+    Robot,
+    identify,
+    load_robot,
+    read_log,
+)
+from joulepath.models.robot import Array
 from joulepath.optimizer.identify.logs.recorded import measured
-from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.fit_rows import ROWS
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import (
     GRAVITY,
     SILENT,

@@ -11,12 +11,16 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
-from joulepath.optimizer.identify.errors import LogTooLarge
-from joulepath.optimizer.identify.logs.log_options import LogOptions
-from joulepath.optimizer.identify.logs.reading import read_log
-from joulepath.optimizer.problem.robots import load_robot
+from joulepath import (
+    InvalidProblem,
+    InvalidTable,
+    LogOptions,
+    LogTooLarge,
+    Robot,
+    load_robot,
+    read_log,
+)
+from joulepath.models.robot import Array
 from tests.identification_logs import SILENT, Recording, csv_of, recorded, truth_of
 
 UR = load_robot("ur5e")

@@ -10,18 +10,14 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from joulepath.models.robot import Array, Robot
+from joulepath import Arm, Identification, IdentificationOptions, Log, Robot, identify, load_robot
+from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.link_regressor import rigid_torques
 from joulepath.optimizer.dynamics.losses import breakdown
 from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Method, Term
 from joulepath.optimizer.identify.estimates.grouped import GroupedEquations
 from joulepath.optimizer.identify.fits.block import LawEquations
-from joulepath.optimizer.identify.identify import Identification, identify
-from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.robots import load_robot
 from tests.identification_logs import (
     WITHOUT_SPLIT,
     Recording,

@@ -11,14 +11,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath import Robot, SingularPose
+from joulepath import Robot, SingularPose, load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.joint_axes import JointAxes
 from joulepath.optimizer.kinematics.six.decomposition import DecomposedArm
 from joulepath.optimizer.kinematics.six.drawing import DrawnMotion
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
-from joulepath.optimizer.problem.robots import load_robot
 from tests.optimizer.kinematics.axis_patterns import UR_AXES, redrawn, robot_of, shifted
 from tests.optimizer.kinematics.six_joints import (
     ACCURACY,

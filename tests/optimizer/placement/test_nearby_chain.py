@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath import Arm, Cycle, Pose, load_robot
+from joulepath import Arm, Cycle, Moved, Pose, Region, WeightedCycle, load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.known_motions import KnownMotions
 from joulepath.optimizer.deadline import Deadline
@@ -19,8 +19,7 @@ from joulepath.optimizer.placement.moved_cycle import cycle_at, inverted
 from joulepath.optimizer.placement.nearby_chain import Visited, nearby_cycle
 from joulepath.optimizer.placement.nearby_energy import NearbyEnergy
 from joulepath.optimizer.placement.place_solver import PlaceResult, PlaceSolver
-from joulepath.optimizer.placement.placement import Placement, WeightedCycle
-from joulepath.optimizer.placement.region import Moved, Region
+from joulepath.optimizer.placement.placement import Placement
 from joulepath.optimizer.placement.space import Place, Space
 from joulepath.optimizer.problem.cycle import START
 from tests.optimizer.placement.cells import at, floor, two_stops

@@ -8,12 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.robots import load_robot
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
+from joulepath import Arm, Box, Cycle, InvalidProblem, Obstacle, Payload, Problem, Scene, load_robot
 
 ROBOT = load_robot("ur5e")
 HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]

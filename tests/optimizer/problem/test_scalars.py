@@ -3,9 +3,19 @@
 import numpy as np
 import pytest
 
-from joulepath import Arm, BranchFilter, Bus, Cycle, Dwell, Payload, Problem, Sphere, Stop
-from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.problem.robots import load_robot
+from joulepath import (
+    Arm,
+    BranchFilter,
+    Bus,
+    Cycle,
+    Dwell,
+    InvalidProblem,
+    Payload,
+    Problem,
+    Sphere,
+    Stop,
+    load_robot,
+)
 from joulepath.optimizer.problem.scalars import check_number
 
 ARM = Arm(robot=load_robot("ur5e"))

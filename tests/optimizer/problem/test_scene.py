@@ -8,18 +8,24 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath import Attachment, Box, Capsule, Cylinder, Mesh, Payload, Sphere, even_payload
+from joulepath import (
+    Attachment,
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    InvalidProblem,
+    Mesh,
+    Obstacle,
+    Payload,
+    Scene,
+    Sphere,
+    capsule_between,
+    even_payload,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.cores import core_of
-from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.problem.scene import (
-    SCENE_RANGES,
-    HalfSpace,
-    Obstacle,
-    Scene,
-    Shape,
-    capsule_between,
-)
+from joulepath.optimizer.problem.scene import SCENE_RANGES, Shape
 
 NAN = float("nan")
 CUBE = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T * 0.2

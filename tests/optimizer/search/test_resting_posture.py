@@ -7,12 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.evaluate.recording import Waypoints
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.problem import Problem
+from joulepath import Arm, Dwell, Payload, Problem, Waypoints, evaluate, optimize
 from tests.optimizer.moves import ROBOT
 
 ARM = Arm(robot=ROBOT, payload=Payload(mass=5.0), collisions=False)
