@@ -144,11 +144,12 @@ SLOW = (
 
 
 @pytest.fixture
-def robot(client: TestClient) -> str:
+def robot(client: TestClient) -> Iterator[str]:
     """The name of a robot added by a user."""
     answer = client.put("/robots/added", json=PUT_EXAMPLES["makers_figures"]["value"])
     assert answer.is_success, answer.text
-    return "added"
+    yield "added"
+    client.delete("/robots/added")
 
 
 @pytest.fixture(scope="module")
