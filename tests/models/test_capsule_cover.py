@@ -117,13 +117,3 @@ def test_distances_are_those_of_a_capsule() -> None:
     tube = capsule([0, 0, 0], [0, 0, 1], 0.25)
     points = np.array([[0.5, 0, 0.5], [0, 0, 1.5], [0, 0.1, 0.2], [0, 0.3, -0.4]])
     assert outside(points, [tube])[0] == pytest.approx([0.25, 0.25, -0.15, 0.25])
-
-
-def test_samples_are_uniform_over_the_area() -> None:
-    """Three quarters of the area, three quarters of the points; and the centroid is their mean."""
-    surface = triangles([[0, 0, 0], [3, 0, 0], [0, 1, 0]], [[5, 0, 0], [6, 0, 0], [5, 1, 0]])
-    points = sampled(surface, 40_000, np.random.default_rng(1))
-    left = points[:, 0] < 4
-    # four standard deviations of a share of 40,000 points
-    assert left.mean() == pytest.approx(0.75, abs=0.009)
-    assert points[left].mean(axis=0) == pytest.approx([1, 1 / 3, 0], abs=0.02)

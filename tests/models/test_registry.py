@@ -230,11 +230,6 @@ def test_loading_leaves_the_robot_alone(robot: Robot) -> None:
     assert robot.model == before
 
 
-def test_shared_arrays_are_read_only(robot: Robot) -> None:
-    with pytest.raises(ValueError, match="read-only"):
-        robot.limits.q_max[0] = 7.0
-
-
 @pytest.mark.parametrize("name", ["ur3e", "ur5e"])
 def test_the_elbow_is_a_figure(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The capsule about the third axis, at the far end of the upper arm; a robot without the figure
@@ -331,11 +326,6 @@ def test_every_link_has_capsules(robot: Robot) -> None:
         for capsule in robot.capsules
     )
     assert all(first + 1 < second for first, second in robot.never_in_collision)
-
-
-def test_a_robot_may_have_no_default_motion() -> None:
-    without = {name for name in robot_names() if load_robot(name).default_motion is None}
-    assert without >= {"fr3", "iiwa14", "kr10_r1100", "panda"} and "ur5e" not in without
 
 
 def test_the_kuka_stands_on_its_base_with_its_first_axis_down() -> None:

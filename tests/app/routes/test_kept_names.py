@@ -95,15 +95,15 @@ def test_a_robot_is_searched_for(recorded: TestClient, things: str) -> None:
 @pytest.mark.parametrize("things", ADD)
 def test_pages_of_a_search_hold_everything_once(recorded: TestClient, things: str) -> None:
     """The newest comes first."""
-    name, ids = f"Shift {uuid4().hex[:6]}", [ADD[things][0](recorded) for _ in range(3)]
+    name, ids = f"Shift {uuid4().hex[:6]}", [ADD[things][0](recorded) for _ in range(4)]
     for id in ids:
         recorded.patch(f"/{things}/{id}", json={"name": name})
     query: dict[str, Any] = {"limit": 2, "search": name}
     first = recorded.get(f"/{things}", params=query).json()
     rest = recorded.get(f"/{things}", params=query | {"after": first["next"]}).json()
     assert [[each["id"] for each in page[things]] for page in (first, rest)] == [
-        ids[:0:-1],
-        ids[:1],
+        ids[:1:-1],
+        ids[1::-1],
     ]
     assert rest["next"] is None
 
