@@ -176,4 +176,4 @@ class CompareTask:
     def _whole(self, method: MethodName, solution: Solution) -> OptimizeAnswer:
         """The complete answer of a method."""
         asked = self.request.by(method)
-        return OptimizeAnswer.of(asked, self.request_id, solution, arm_fields(asked))
+        return OptimizeAnswer.of(asked, self.request_id, solution, arm_fields(self.request))

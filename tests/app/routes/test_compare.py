@@ -74,7 +74,8 @@ def test_the_table_is_what_single_requests_answer(
 
 
 def test_whole_answers_on_request_in_the_order_asked(client: TestClient) -> None:
-    table = compared(client, methods=["uniform_scaling", "bspline"], answers=True)
+    lighter = {"link_mass_scale": 0.9}
+    table = compared(client, methods=["uniform_scaling", "bspline"], answers=True, **lighter)
     assert [row["method"] for row in table["methods"]] == ["uniform_scaling", "bspline"]
     for row in table["methods"]:
         assert (
@@ -85,6 +86,7 @@ def test_whole_answers_on_request_in_the_order_asked(client: TestClient) -> None
             "none of them is kept"
         )
         assert row["answer"]["energy"]["electrical"]["total"] == row["electrical"]
+        assert row["answer"]["arm"] == lighter, "as in the request, without defaults"
 
 
 def test_a_method_that_cannot_be_as_fast_says_so_in_its_row(client: TestClient) -> None:
