@@ -17,7 +17,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.evaluate.sample_check import check_samples
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.export.program import Move, Program, Rest
+from joulepath.optimizer.export.program import Move, Program, Rest, with_payload_at_end
 from joulepath.optimizer.motion.joined import spline_through
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
@@ -106,6 +106,7 @@ class _Cycle(Part):
 
     robot: RobotName
     legs: Annotated[list[_Leg], Field(min_length=1, max_length=LIMITS.legs)]
+    payload_at_end: dict[str, Any] | None = None
 
 
 _A_FRONT = "points"
@@ -165,13 +166,17 @@ def _cycle(
 ) -> Program:
     if arm is not None:
         raise InvalidProblem("arm", "The moves of a cycle have arms of their own: leave `arm` out.")
-    moves = iter(kept([leg.answer for leg in found.legs if leg.answer is not None]))
-    steps = list[Move | Rest]()
+    answers = kept([leg.answer for leg in found.legs if leg.answer is not None])
+    moves, steps = iter(answers), list[Move | Rest]()
     for leg in found.legs:
         if leg.kind in MOVING:
             steps.append(_move(next(moves), None, f"{leg.start.stop} to {leg.goal.stop}"))
         else:
             steps.append(Rest(leg.duration, f"{leg.kind} at {leg.goal.stop}"))
+    if found.payload_at_end is not None:
+        last = _Planned.model_validate(answers[-1])
+        own = None if last.arm is None else last.arm | {"payload": found.payload_at_end}
+        steps = with_payload_at_end(steps, _arm(found.robot, own, None).payload)
     return Program(tuple(steps))
 
 

@@ -58,7 +58,7 @@ def to_franka(program: Program, options: FrankaOptions | None = None) -> Written
     """
     options = options or FrankaOptions()
     check_joints(program, "franka", 7, "Franka Robotics", "robots of Franka, with seven joints")
-    if any(timed.payload is not None for timed in program.timed):
+    if program.changes_payload:
         raise FormatUnsuitable(
             "franka",
             "The payload changes on the way, and a motion generator cannot switch it: export move "

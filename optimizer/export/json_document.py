@@ -14,7 +14,7 @@ def to_json(program: Program) -> WrittenFile:
 
     A step of kind `move` has a clamped B-spline (`degree`, `knots` [s] from its own start,
     `control_points` [point][joint] [rad]), one of kind `rest` stands still for `duration` [s]. Both
-    have `t0` [s].
+    have `t0` [s]. A move has its `payload`, and so does a last rest that changes it.
     """
     content = {
         "robot": program.robot.name,
@@ -41,4 +41,6 @@ def _step(program: Program, timed: Timed) -> dict[str, Any]:
         content["degree"] = spline.degree
         content["knots"] = spline.knots.tolist()
         content["control_points"] = spline.control_points.tolist()
+    elif step.payload is not None:
+        content["payload"] = {"mass": step.payload.mass, "com": step.payload.com.tolist()}
     return content

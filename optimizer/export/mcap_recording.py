@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import repeat
 from pathlib import Path
 from typing import Any, Literal
@@ -23,7 +23,7 @@ from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.export.facts import WrittenFile
 from joulepath.optimizer.export.markers import Fields, markers, pose
 from joulepath.optimizer.export.option_ranges import OPTION_RANGES
-from joulepath.optimizer.export.program import Move, Program, Timed
+from joulepath.optimizer.export.program import Move, Program, Rest, Timed
 from joulepath.optimizer.export.quintic_points import NANOSECONDS, quintic_points
 from joulepath.optimizer.export.ros_messages import joint_trajectory
 from joulepath.optimizer.export.rows import check_period, times
@@ -146,10 +146,14 @@ def _rows(
 
 
 def _resting(program: Program, rest: Timed) -> Arm:
-    """The arm of a rest: that of the move after it, whose payload it already has, or before it."""
+    """The arm of a rest: that of the move after it, whose payload it already has, or before it,
+    with the payload that it has at the end."""
     after = (each.step for each in program.timed if each.t0 > rest.t0)
     moves = (each for each in after if isinstance(each, Move))
-    return next(moves, program.moves[-1]).arm
+    arm, last = program.moves[-1].arm, program.steps[-1]
+    if isinstance(last, Rest) and last.payload is not None:
+        arm = replace(arm, payload=last.payload)
+    return next((move.arm for move in moves), arm)
 
 
 def _transforms(T: Array, frames: list[str], t: float) -> list[Fields]:

@@ -42,10 +42,12 @@ class Move:
 
 @dataclass(frozen=True)
 class Rest:
-    """The arm stands still for `duration` [s]."""
+    """The arm stands still for `duration` [s] with `payload`; None stands for the payload of the
+    next move, or of the last one."""
 
     duration: float
     label: str = "rest"
+    payload: Payload | None = None
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,11 @@ class Program:
         return self.moves[0].arm.payload
 
     @property
+    def changes_payload(self) -> bool:
+        """Whether moves have different payloads."""
+        return any(not _same(move.arm.payload, self.payload) for move in self.moves)
+
+    @property
     def duration(self) -> float:
         """Duration [s], with rests."""
         return sum((step.duration for step in self.steps), 0.0)
@@ -126,14 +133,14 @@ class Program:
         """Steps with their starts. The payload changes as soon as the arm stands at the place."""
         timed, t, carried = list[Timed](), 0.0, self.payload
         for k, step in enumerate(self.steps):
-            following = next((each for each in self.steps[k:] if isinstance(each, Move)), None)
-            payload = None
-            if k and following is not None and not _same(following.arm.payload, carried):
-                payload = following.arm.payload
+            held = next(
+                (each for each in map(_payload, self.steps[k:]) if each is not None), carried
+            )
+            payload = None if _same(held, carried) else held
             timed.append(
                 Timed(step, t, payload, payload is not None and payload.mass > carried.mass)
             )
-            carried, t = payload or carried, t + step.duration
+            carried, t = held, t + step.duration
         return tuple(timed)
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
@@ -163,6 +170,15 @@ class Program:
         return Program(steps, self.speed_scale * speed_scale)
 
 
+def with_payload_at_end(steps: list[Move | Rest], payload: Payload) -> list[Move | Rest]:
+    """The steps with the payload that the arm has after the last move, as where a part is put down
+    at the end; without a rest after it, in a rest of no duration."""
+    *before, last = steps
+    if isinstance(last, Move):
+        return [*steps, Rest(0.0, "end", payload)]
+    return [*before, replace(last, payload=payload)]
+
+
 def program_of_cycle(found: CycleSolution) -> Program:
     """The moves of a cycle, its dwells and waits."""
     steps = list[Move | Rest]()
@@ -174,7 +190,14 @@ def program_of_cycle(found: CycleSolution) -> Program:
         for label, length in (("dwell", planned.dwell), ("wait", move.wait)):
             if length > 0:
                 steps.append(Rest(length, f"{label} at {planned.goal}"))
+    last = found.moves[-1].planned
+    if not _same(last.arm_after.payload, last.arm.payload):
+        steps = with_payload_at_end(steps, last.arm_after.payload)
     return Program(tuple(steps))
+
+
+def _payload(step: Move | Rest) -> Payload | None:
+    return step.arm.payload if isinstance(step, Move) else step.payload
 
 
 def _same(one: Payload, other: Payload) -> bool:

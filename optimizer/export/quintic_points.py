@@ -75,6 +75,8 @@ def quintic_points(program: Program, format: str) -> QuinticPoints:
         if isinstance(timed.step, Move):
             t, states, deviation = _points_of_move(timed.step.spline, timed.t0, format)
             worst = np.maximum(worst, deviation)
+        elif timed.step.duration == 0:
+            continue
         else:
             t = np.array([timed.t0, timed.t0 + timed.step.duration])
             states = np.repeat(rows[-1][-1:], 2, axis=0)

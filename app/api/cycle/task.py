@@ -44,6 +44,9 @@ class CycleAnswer(SolvedCycle, Answer):
     method: MethodName
     """How the moves are parametrised."""
     legs: Annotated[list[CycleLeg], NotEmpty]
+    payload_at_end: dict[str, Any] | None
+    """What the arm carries after the last move, in the form of a request, if it takes something up
+    or puts something down there; else null."""
     warnings: list[str]
     """Remarks on the cycle and on its moves, as in `POST /optimize`, with the ends of the move.
     Empty if there are none."""
@@ -60,6 +63,7 @@ class CycleAnswer(SolvedCycle, Answer):
             request=request_id,
             robot=request.robot,
             method=request.method,
+            payload_at_end=_payload_at_end(request, found),
             warnings=[*unlikely_units(request), *_warnings(found)],
             **cycle,
         )
@@ -174,14 +178,29 @@ def _of_rest(leg: LegReport, number: int) -> list[Row]:
 
 def arms_of_moves(request: CycleRequest, found: CycleSolution) -> list[dict[str, Any] | None]:
     """The result of `arm_fields` for every move as a request of its own."""
+    return [
+        _arm(request, move.planned.arm, carried)
+        for move, carried in zip(found.moves, _payloads(request, found), strict=False)
+    ]
+
+
+def _payloads(request: CycleRequest, found: CycleSolution) -> list[Payload | None]:
+    """Payloads of the request on every move and after the last one."""
     stops = {stop.name or str(k): stop for k, stop in enumerate(request.stops, 1)}
-    carried, arms = request.payload, list[dict[str, Any] | None]()
+    carried = [request.payload]
     for move in found.moves:
-        arms.append(_arm(request, move.planned.arm, carried))
         stop = stops.get(move.planned.goal) if move.planned.at_stop else None
-        if stop is not None and "payload" in stop.model_fields_set:
-            carried = stop.payload
-    return arms
+        changes = stop is not None and "payload" in stop.model_fields_set
+        carried.append(stop.payload if stop is not None and changes else carried[-1])
+    return carried
+
+
+def _payload_at_end(request: CycleRequest, found: CycleSolution) -> dict[str, Any] | None:
+    """The payload after the last move, if it is not that of the last move."""
+    *_, before, after = _payloads(request, found)
+    if before == after:
+        return None
+    return {"mass": 0.0} if after is None else after.model_dump(mode="json", exclude_unset=True)
 
 
 def _arm(request: CycleRequest, arm: Arm, carried: Payload | None) -> dict[str, Any] | None:

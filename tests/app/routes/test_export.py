@@ -127,6 +127,24 @@ def test_the_program_of_a_cycle_runs_from_stop_to_stop(client: TestClient) -> No
     )
 
 
+@pytest.mark.parametrize("dwell", [0.0, 0.2])
+def test_the_program_of_an_open_cycle_puts_down_what_it_carried(
+    client: TestClient, dwell: float
+) -> None:
+    place = {"name": "place", "target": {"q": NEAR}, "payload": None, "dwell": dwell}
+    tool = {"tool": "suction_cup", "payload": LOAD}
+    found = client.post(
+        "/cycle",
+        json=tool | {"start": {"q": HOME}, "stops": [place], "closed": False, "deadline": 100.0},
+    ).json()
+    assert found["payload_at_end"] == {"mass": 0.0}
+    controller = Controller(np.array(HOME))
+    controller.run(export(client, "urscript", found, urscript={"digital_output": 1}).text)
+    assert [event[1:] for event in controller.events if event[0] == "output"] == [(1, False)]
+    carried, left = [event[1] for event in controller.events if event[0] == "payload"]
+    assert carried - left == pytest.approx(LOAD["mass"]) and left > 0, "the tool stays"
+
+
 def test_an_evaluated_motion_is_exported_by_its_samples(client: TestClient) -> None:
     body = {"configurations": [HOME, NEAR], "time_per_segment": 3.0, "payload": LOAD}
     evaluated = client.post("/evaluate", json=body | {"sample_period": 0.1}).json()

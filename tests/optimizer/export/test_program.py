@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -22,16 +23,21 @@ from joulepath import (
     Spline,
     Stop,
     Trajectory,
+    UrscriptOptions,
     plan_cycle,
 )
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.evaluate.sample_check import check_samples
 from joulepath.optimizer.export.certified import certified
+from joulepath.optimizer.export.json_document import to_json
 from joulepath.optimizer.export.program import program_of_cycle
+from joulepath.optimizer.export.quintic_points import quintic_points
+from joulepath.optimizer.export.urscript import to_urscript
 from joulepath.optimizer.motion.joined import spline_through
 from joulepath.optimizer.motion.spline import retimed
 from tests.optimizer.export.programs import cycle_with_payload
 from tests.optimizer.export.read_back.random_motions import arm_of, one_move, random_spline
+from tests.optimizer.export.read_back.urscript_machine import Controller
 from tests.optimizer.moves import AMPLE, GOAL, START
 
 
@@ -152,6 +158,27 @@ def test_a_cycle_of_the_optimiser_becomes_a_program() -> None:
     switched = [each for each in program.timed if each.payload is not None]
     assert [each.grasps for each in switched] == [True, False]
     certified(program)
+
+
+@pytest.mark.parametrize("dwell", [0.0, 0.3])
+def test_what_is_put_down_at_the_end_is_put_down_by_the_program(dwell: float) -> None:
+    """The last stop of an open cycle changes the payload, and no move follows."""
+    stop = Stop(name="place", target=GOAL, dwell=dwell, payload=Payload())
+    carrying = replace(arm_of("ur5e"), payload=Payload(1.0))
+    found = plan_cycle(Cycle(arm=carrying, start=START, stops=[stop], closed=False, deadline=AMPLE))
+    program = program_of_cycle(found).slowed(0.5)
+    move, rest = program.timed
+    assert move.payload is None and rest.payload is not None
+    assert (rest.payload.mass, rest.grasps, rest.step.duration) == (0.0, False, dwell)
+    controller = Controller(START)
+    controller.run(to_urscript(program, UrscriptOptions(digital_output=3)).content.decode())
+    events = [event[1:] for event in controller.events if event[0] in ("output", "payload")]
+    assert events[0][0] == 1.0 and events[-2] == (3, False) and events[-1][0] == 0.0
+    assert (np.diff(quintic_points(program, "ros2").nanoseconds) > 0).all()
+    (resting,) = {
+        state["payload"]["mass"] for state in json.loads(to_json(program).content)["steps"][1:]
+    }
+    assert resting == 0.0
 
 
 def test_the_page_shows_what_works() -> None:
