@@ -43,7 +43,7 @@ def part_of(cell: Locator) -> Locator:
             "m out of reach in this orientation: move the position",
         ),
         ("/goal/pose/position/2", "1400", "out of reach in this orientation"),
-        ("/payload/mass", "40", "more than a Universal Robots UR5e may carry"),
+        ("/payload/mass", "40", "exceeds the rated payload of the Universal Robots UR5e"),
         ("/payload/mass", "-1", "at least 0"),
         ("/scene/obstacles/0/pose/position/2", "200", "in collision"),
     ],

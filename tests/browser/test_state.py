@@ -106,7 +106,7 @@ def test_a_file_that_is_dropped_is_opened_or_refused(browser: Browser, service: 
         until(page, SHOWN)
         for name, text, why in (
             ("photo.png", "\x89PNG", "Save as a file"),
-            ("answer.json", '{"robot": "ur5e", "trajectory": {}}', "It holds an answer"),
+            ("answer.json", '{"robot": "ur5e", "trajectory": {}}', "This is an answer"),
         ):
             assert page.evaluate(DROPPED, [name, text]) is False
             expect(page.locator("#problem")).to_contain_text(f"{name} is not a project")

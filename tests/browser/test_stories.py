@@ -91,7 +91,7 @@ def test_a_programmer_takes_a_program_to_the_controller(browser: Browser, servic
         expect(page.locator("#costs thead")).to_contain_text("4,800×")
         notes = page.locator("#notes")
         expect(notes).to_contain_text("Waiting needs")
-        expect(notes).to_contain_text(re.compile(r"brakes at rest, 0\.5 s .* J, .* % less"))
+        expect(notes).to_contain_text(re.compile(r"Brakes after 0\.5 s at rest: .* J, .* % less"))
         expect(notes.get_by_role("button", name="Use brakes")).to_be_visible()
         page.locator("#export").click()
         expect(page.locator("#preview")).to_contain_text("0.1 of its speed")

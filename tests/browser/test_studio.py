@@ -99,7 +99,8 @@ def test_figures_are_those_of_the_answer(page: Page) -> None:
     assert exact <= gap <= exact + 0.01
     friction = page.locator("#breakdown li", has_text="friction").locator("b").inner_text()
     assert float(friction.split()[0]) == pytest.approx(electrical["friction"], rel=0.01)
-    likely = re.findall(r"[\d.]+", page.locator("#likely").inner_text())
+    ninety, *likely = re.findall(r"[\d.]+", page.locator("#likely").inner_text())
+    assert ninety == "90"
     interval = electrical["interval"]
     assert [float(each) for each in likely] == pytest.approx(
         [interval["p5"], interval["p95"]], rel=0.02

@@ -137,7 +137,5 @@ function Saving({ of: way }: { of: Baseline }) {
         {percent(saving)}
       </b>
     );
-  return (
-    <span title={likely}>{saving > -EQUAL ? "no saving" : `needs ${percent(-saving)} less`}</span>
-  );
+  return <span title={likely}>{saving > -EQUAL ? "none" : percent(saving)}</span>;
 }

@@ -45,11 +45,11 @@ export function Hero() {
           <dd>{figure(solution.duration)} s</dd>
         </div>
         <div>
-          <dt>mean power</dt>
+          <dt>mean</dt>
           <dd>{figure(solution.energy.mean_power, 2)} W</dd>
         </div>
         <div>
-          <dt>peak power</dt>
+          <dt>peak</dt>
           <dd>{figure(solution.energy.peak_power)} W</dd>
         </div>
         <div>

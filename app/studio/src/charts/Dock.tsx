@@ -25,7 +25,7 @@ export function Dock() {
   const now = options.some(({ value }) => value === view.value) ? view.value : "power";
   return (
     <section class={`dock${stale.value ? " stale" : ""}`} aria-label="Charts" id="figures">
-      {stale.value && <p class="old">without your changes</p>}
+      {stale.value && <p class="old">not up to date</p>}
       {shown.cycle && <LegTimeline cycle={shown.cycle} />}
       <div class="charts">
         <div class="chart">

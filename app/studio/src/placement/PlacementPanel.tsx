@@ -66,11 +66,11 @@ function Found() {
           <dd id="place-saving">{saving === null ? "–" : percent(saving)}</dd>
         </div>
         <div>
-          <dt>lower bound of all places</dt>
+          <dt>lower bound</dt>
           <dd>{answer.lower_bound === null ? "no bound" : `${figure(answer.lower_bound)} J`}</dd>
         </div>
         <div>
-          <dt>places computed, also outside the map</dt>
+          <dt>places computed in all</dt>
           <dd>{answer.evaluated}</dd>
         </div>
       </dl>

@@ -4,15 +4,15 @@ import type { Answered } from "./state";
 import { figure, words } from "./units";
 
 export const BASELINES: Record<string, string> = {
-  trapezoid: "Trapezoidal speed profile",
+  trapezoid: "Trapezoidal speed",
   quintic: "Quintic polynomial",
   ruckig: "Time-optimal motion",
-  ruckig_slowed: "Time-optimal, slowed down",
-  straight: "Straight line in joint space",
+  ruckig_slowed: "Time-optimal, slowed",
+  straight: "Straight in joint space",
   controller_default: "Controller default",
   waypoints: "Via points with stops",
   blended: "Rounded via points",
-  even_speed: "Constant speed on the path",
+  even_speed: "Constant speed on path",
   stopping: "Rest at every stop",
   move_by_move: "Each move chosen alone",
   same_factor: "All moves scaled equally",

@@ -107,7 +107,7 @@ export function PayloadFields({ pointer }: { pointer: Pointer }) {
           ? "Centre and inertia are computed from mass and size."
           : listOf(inertia).length
             ? "The inertia is set in the JSON."
-            : "The mass is a point mass. With a shape, its inertia is included."}
+            : "The mass is a point mass; an evenly filled shape adds its inertia."}
       </p>
     </details>
   );

@@ -11,7 +11,7 @@ export function PlaceField() {
   return (
     <Section title="Placement" id="place">
       <Button id="place-robot" disabled={placing.value} onClick={open}>
-        Placement of the robot …
+        Find the best place …
       </Button>
     </Section>
   );
