@@ -58,12 +58,12 @@ _SERVICE_LINKS = re.compile(r"SERVICE_(HOST|PORT)(_.*)?|PORT_[0-9]+_.*")
 _M_MMAP_THRESHOLD = -3
 """Parameter of glibc's `mallopt`: the least size of separately mapped blocks [byte]."""
 _REMEDIES = {
-    errno.EADDRINUSE: "another program has this address, perhaps another service. End it, or "
-    "choose another port by "
-    "--port, JOULEPATH_PORT or PORT (`make serve PORT=8001`); 0 takes a free one",
-    errno.EACCES: "ports below 1024 are not for everyone. Choose a larger one by --port, "
+    errno.EADDRINUSE: "another program, perhaps another service, uses this address. End it, or "
+    "choose another port with --port, JOULEPATH_PORT or PORT (`make serve "
+    "PORT=8001`); 0 takes a free one",
+    errno.EACCES: "ports below 1024 need special rights. Choose a larger one with --port, "
     "JOULEPATH_PORT or PORT",
-    errno.EADDRNOTAVAIL: "this machine does not have this address. Choose one that it has by "
+    errno.EADDRNOTAVAIL: "this machine does not have this address. Choose one that it has with "
     "--host or JOULEPATH_HOST",
 }
 
@@ -128,7 +128,7 @@ def listen(host: str, port: int) -> list[socket.socket]:
         for each in sockets:
             each.close()
         remedy = _REMEDIES.get(
-            error.errno or 0, "choose another address by JOULEPATH_HOST or --host"
+            error.errno or 0, "choose another address with JOULEPATH_HOST or --host"
         )
         reason = (error.strerror or "").partition(" (while")[0]
         raise WrongSettings(

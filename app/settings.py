@@ -17,11 +17,11 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 _NAMES = {
     "allowed_hosts": (
         re.compile(r"[A-Za-z0-9._-]+"),
-        "no name of a host: give names without scheme and port, as `robots.example`",
+        "not a host name: give names without scheme and port, for example `robots.example`",
     ),
     "cors_origins": (
         re.compile(r"https?://([A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\])(:[0-9]{1,5})?"),
-        "no origin: give scheme, name and port only, as `https://cell4.example`",
+        "not an origin: give only scheme, name and port, for example `https://cell4.example`",
     ),
 }
 """Settings with lists of names: the form of a name, and the end of the error message."""
@@ -58,9 +58,8 @@ class Settings(BaseSettings):
     )
     open: bool = Field(
         default=False,
-        description="Whether the service may listen on an address of the network without API keys. "
-        "It does not make "
-        "keys optional where there are some.",
+        description="Whether the service may listen on an address of the network without API "
+        "keys. If there are keys, they stay mandatory.",
     )
     allowed_hosts: Annotated[tuple[str, ...], NoDecode] = Field(
         default=(),
@@ -77,13 +76,12 @@ class Settings(BaseSettings):
     trusted_proxies: Annotated[tuple[IPv4Network | IPv6Network, ...], NoDecode] = Field(
         default=(),
         description="Addresses or networks of the reverse proxies whose reports of the client's "
-        "address are believed, "
-        "separated by commas.",
+        "address are trusted, separated by commas.",
     )
     proxy_header: Literal["X-Forwarded-For", "Forwarded"] = Field(
         default="X-Forwarded-For",
-        description="The header in which these proxies report it; the other one is a client's own "
-        "word.",
+        description="Header in which these proxies report the client's address; the other "
+        "header is not trusted.",
     )
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         default="info", description="Lowest level that is logged."
@@ -101,10 +99,10 @@ class Settings(BaseSettings):
         "their first request.",
     )
     max_robots: int = Field(
-        default=100, ge=0, description="Robots of users' own that the database holds at most."
+        default=100, ge=0, description="Largest number of robots added by users."
     )
     max_figures: int = Field(
-        default=1000, ge=0, description="Identified figures that the database holds at most."
+        default=1000, ge=0, description="Largest number of stored identified figures."
     )
     queue_size: int = Field(
         default=64,
@@ -122,8 +120,8 @@ class Settings(BaseSettings):
     client_connections: int = Field(
         default=128,
         ge=1,
-        description="Connections of one address that may be open; of a trusted proxy, any number. "
-        "Requests of one client without a complete answer.",
+        description="Largest number of open connections of one address, except trusted proxies, "
+        "and of requests of one client without a complete answer.",
     )
     max_bytes_in_flight: int = Field(
         default=1 << 28,
@@ -173,14 +171,14 @@ class Settings(BaseSettings):
     job_workers: int | None = Field(
         default=None,
         ge=1,
-        description="Workers that jobs may use at the same time. Default: one less than there are, "
-        "at least 1.",
+        description="Workers that jobs may use at the same time. Default: one less than all "
+        "workers, at least 1.",
     )
     cluster: str | None = Field(
         default=None,
-        description="Scheduler of a Dask cluster that works on jobs, e.g. `tcp://scheduler:8786`. "
-        "Without one, the "
-        "service's own workers do.",
+        description="Scheduler of a Dask cluster that works on jobs, e.g. "
+        "`tcp://scheduler:8786`. Without one, the service's own workers compute "
+        "them.",
     )
     max_waiting: int = Field(
         default=100_000,
@@ -205,16 +203,15 @@ class Settings(BaseSettings):
     stop_grace: float = Field(
         default=0.3,
         gt=0,
-        description="Time [s] in which a worker must end a task that nobody wants any more; after "
-        "it, the worker is "
-        "killed. Most computations look every few milliseconds, and to start a new worker takes "
-        "longer.",
+        description="Time [s] in which a worker must end a task whose result is no longer "
+        "wanted, before it is killed. Most computations check every few "
+        "milliseconds, and starting a new worker takes longer.",
     )
     shutdown_grace: float = Field(
         default=6.0,
         gt=0,
-        description="Time [s] for the requests in progress at a shutdown; all ends within two "
-        "seconds more.",
+        description="Time [s] for the requests in progress at a shutdown; everything ends at "
+        "most 2 s later.",
     )
     database_url: str = Field(
         default_factory=_default_database,
@@ -280,7 +277,8 @@ class Settings(BaseSettings):
         if address is not None:
             if not _SCHEDULER.fullmatch(address):
                 raise ValueError(
-                    f"{address!r} is no address of a scheduler: give one as `tcp://scheduler:8786`"
+                    f"{address!r} is not the address of a scheduler: give it as "
+                    "`tcp://scheduler:8786`"
                 )
             if find_spec("distributed") is None:
                 raise ValueError("a cluster needs Dask: install `joulepath[cluster]`")
@@ -298,8 +296,8 @@ class Settings(BaseSettings):
             if url.database and (is_file or url.get_backend_name() == "postgresql"):
                 return given
         raise ValueError(
-            "this is no database of the service: give `sqlite:////folder/file` (of an absolute "
-            "path) or `postgresql://user:password@host/name`"
+            "this is not a database of the service: give `sqlite:////folder/file` (of an "
+            "absolute path) or `postgresql://user:password@host/name`"
         )
 
     @field_validator("robots")

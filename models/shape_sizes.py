@@ -61,8 +61,7 @@ def check_scale(name: str, scale: Array, points: Array) -> None:
     pressed = (extents * factors < SIZES.smallest) & (extents * factors.max() >= SIZES.smallest)
     if (factors == 0).any() or pressed.any():
         raise WrongSize(
-            f"{name} must not press the mesh flat, as {' '.join(f'{each:g}' for each in scale)} "
-            "does."
+            f"{name} must not flatten the mesh, as {' '.join(f'{each:g}' for each in scale)} does."
         )
     check_extent(f"{name} is wrong: the mesh", points * scale)
 

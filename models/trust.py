@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 TRUST = {
-    "A": "maker's own file or data packet",
+    "A": "published by the manufacturer",
     "B": "fitted to measured data",
-    "C": "value from a paper or another's file, second-hand",
+    "C": "from a paper or a third party's file, second-hand",
     "T": "transferred from a sister robot",
-    "E": "engineering default, no source",
+    "E": "engineering default without a source",
 }
 # sections of figures with an influence on energies
 ENERGY_SECTIONS = ("inertials", "friction_laws", "drives", "electronics")
 _GROUPS = {
-    "A": "the maker's own figures",
+    "A": "the manufacturer's figures",
     "B": "figures fitted to measured data",
     "C": "second-hand figures",
     "T": "figures transferred from a sister robot",
@@ -29,9 +29,7 @@ def energy_trust(figures: dict[str, Any]) -> str:
         for letter, names in figures_by_letter(figures).items()
     ]
     *first, last = groups
-    return (
-        f"Energies rest on {', '.join(first)} and {last}." if first else f"Energies rest on {last}."
-    )
+    return f"Energies are based on {' and '.join([', '.join(first), last] if first else [last])}."
 
 
 def figures_by_letter(figures: dict[str, Any]) -> dict[str, list[str]]:

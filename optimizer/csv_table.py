@@ -56,7 +56,7 @@ def line_of(file: Lines, row: int, longest: int) -> str:
     try:
         return raw.decode()
     except UnicodeDecodeError:
-        raise InvalidTable(f"Line {row} is no UTF-8 text: send CSV as plain text.", row) from None
+        raise InvalidTable(f"Line {row} is not UTF-8 text: send CSV as plain text.", row) from None
 
 
 def header_of(file: Lines, longest: int, separators: str = SEPARATORS) -> tuple[list[str], str]:
@@ -157,7 +157,7 @@ def _first_error(
             if not finite:
                 name = columns[k]
                 return InvalidTable(
-                    f"{name} in line {row} is no finite number: correct or delete it.", row, name
+                    f"{name} in line {row} is not a finite number: correct or delete it.", row, name
                 )
     return InvalidTable(
         f"The lines from line {rows[0]} on cannot be read: write plain numbers.", rows[0]
@@ -174,5 +174,8 @@ def wrong_length(line: str, row: int, cells: int, columns: int, separator: str) 
             "in the header."
         )
     elif any(other in line for other in SEPARATORS.replace(separator, "")):
-        message += f" The header separates them by {_WORDS[separator]}: do so in every line."
+        message += (
+            f" The header separates the columns by {_WORDS[separator]}: use the same separator in "
+            "every line."
+        )
     return InvalidTable(message, row)

@@ -104,9 +104,9 @@ class ContradictoryOrder(JoulepathError):
 
 @dataclass(eq=False)
 class InvalidTable(JoulepathError):
-    """The samples of a given motion or of a log cannot be read. Possible causes: a value is no
-    finite number, or looks like degrees; the times do not increase; a line has too few or too many
-    columns; the header is missing or unknown; the file is no CSV."""
+    """The samples of a given motion or of a log cannot be read. Possible causes: a value is
+    not a finite number, or looks like degrees; the times do not increase; a line has too few or too
+    many columns; the header is missing or unknown; the file is not a CSV."""
 
     title = "Invalid table"
     remedy = "Correct the place that `row` and `column` name."
@@ -151,7 +151,7 @@ class OutsideLimits(JoulepathError):
             f"The {self.target}'s {self.joint} is at {self.value:.6g} rad: "
             f"give a value between {self.lower:.6g} and {self.upper:.6g} rad."
             + (
-                " It looks like degrees: divide it by 57.29578."
+                " The value looks like degrees: divide it by 57.29578."
                 if abs(self.value) > _LIKE_DEGREES
                 else ""
             )
@@ -243,15 +243,15 @@ class NoConfigurationFound(_TargetError):
         where = " within the position limits" if self.within_limits else ""
         return (
             f"No arm configuration{where} was found for the {self.target} pose. The search may "
-            "miss some, so this does not prove the pose out of reach: give joint positions if you "
-            "know them, or move the pose."
+            "miss configurations, so the pose may still be reachable: give joint positions if "
+            "you know them, or move the pose."
         )
 
 
 @dataclass(eq=False)
 class SingularPose(_TargetError):
-    """The arm reaches the pose only where it can turn about an axis of its own while the TCP stays,
-    in a way that its inverse kinematics does not cover."""
+    """The arm reaches the pose only in configurations in which it can move while the TCP
+    stays at rest, which its inverse kinematics does not cover."""
 
     title = "Singular pose"
     remedy = (
@@ -267,10 +267,9 @@ class SingularPose(_TargetError):
 
     def __str__(self) -> str:
         return (
-            f"At the {self.target} pose the arm can turn about an axis of its own while the TCP "
-            "stays, and its inverse "
-            "kinematics does not cover this: move the pose a few millimetres, or give joint "
-            "positions."
+            f"At the {self.target} pose, the arm can move while the TCP stays at rest, which its "
+            "inverse kinematics does not cover: move the pose by a few millimetres, or give "
+            "joint positions."
         )
 
 

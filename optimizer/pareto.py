@@ -322,8 +322,8 @@ class _Search:
                 dropped.append(Dropped(node.duration, None, node.reason))
             elif self.same_as_least(node):
                 reason = (
-                    "the same least energy as that of the last point, as far as the solver "
-                    "converges"
+                    "the same least energy as that of the last point, within the accuracy of "
+                    "the solver"
                 )
                 dropped.append(Dropped(node.duration, node.energy, reason))
             elif points and (node.duration, node.energy) == (points[-1].duration, least):

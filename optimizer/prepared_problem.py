@@ -210,7 +210,7 @@ class PreparedProblem(Plant):
             ]
         slowest = np.inf if self.least_speed is None else self.least_speed.reached(q, v)
         if slowest < 1 - rounding:
-            broken.append(f"path speed {(1 - slowest) * 100:.3g} % below its least one")
+            broken.append(f"path speed {(1 - slowest) * 100:.3g} % below its minimum")
         if collision is not None:
             first, second = collision.pair
             broken.append(

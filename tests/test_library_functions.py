@@ -196,7 +196,7 @@ def test_export(format: typing.Any) -> None:
     assert file.worst_ratio == pytest.approx(
         max(solution().certificate.worst_ratio.values()), rel=1e-6
     )
-    assert "Not run on hardware" in file.notes[-1]
+    assert "Not tested on hardware" in file.notes[-1]
 
 
 @pytest.mark.parametrize(("format", "robot"), [("franka", "fr3"), ("krl", "kr10_r1100")])

@@ -94,17 +94,17 @@ def read_keys(file: Path) -> list[ApiKey]:
         return _ENTRIES.validate_python(yaml.load(file.read_bytes(), yaml.CSafeLoader) or [])
     except OSError as error:
         raise WrongKeyFile(
-            f"{file} cannot be read ({error.strerror}): name another file, or make it by "
+            f"{file} cannot be read ({error.strerror}): name another file, or create it with "
             "`joulepath keys add`."
         ) from None
     except yaml.YAMLError as error:
         where = f", line {mark.line + 1}" if (mark := getattr(error, "problem_mark", None)) else ""
-        raise WrongKeyFile(f"{file}{where} is no YAML: write it by `joulepath keys`.") from None
+        raise WrongKeyFile(f"{file}{where} is not YAML: write it with `joulepath keys`.") from None
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "the document"
         raise WrongKeyFile(
-            f"{file}: {where}: {first['msg']}: write it by `joulepath keys`."
+            f"{file}: {where}: {first['msg']}: write it with `joulepath keys`."
         ) from None
 
 

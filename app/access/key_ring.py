@@ -41,7 +41,7 @@ class KeyRing:
         try:
             self._keys = [] if stamp is None else read_keys(self._file)
         except WrongKeyFile as error:
-            logger.error("the API keys are those of before", extra={"reason": str(error)})
+            logger.error("the previous API keys stay valid", extra={"reason": str(error)})
         else:
             logger.info("API keys read", extra={"keys": len(self._keys)})
 

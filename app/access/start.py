@@ -26,12 +26,11 @@ def check_access(settings: Settings) -> None:
     """Raises WrongSettings if other machines could reach a service neither protected nor open."""
     if key_ring(settings) is None and not settings.open and not is_loopback(settings.host):
         raise WrongSettings(
-            f"JOULEPATH_HOST={settings.host!r} is reached from other machines, and there are no "
-            "API keys: anyone "
-            "there could read, change and delete everything.\n"
-            "Either make a key by `joulepath keys add NAME --file FILE` and set "
-            "JOULEPATH_API_KEYS_FILE=FILE,\n"
-            "or set JOULEPATH_OPEN=1 if only clients that you trust can reach this address."
+            f"JOULEPATH_HOST={settings.host!r} is reachable from other machines, and there are "
+            "no API keys: anyone there could read, change and delete everything.\nEither create "
+            "a key with `joulepath keys add NAME --file FILE` and set "
+            "JOULEPATH_API_KEYS_FILE=FILE,\nor set JOULEPATH_OPEN=1 if only clients that you "
+            "trust can reach this address."
         )
 
 

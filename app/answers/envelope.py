@@ -40,5 +40,5 @@ class MotionAnswer(Answer):
     """Fields of a motion as answer."""
 
     arm: dict[str, Any] | None
-    """The request's fields of the arm beside its robot: payload, limits, scene, ... Null above 64
-    KiB of JSON."""
+    """Fields of the request on the arm, without its robot: payload, limits, scene, ... Null above
+    64 KiB of JSON."""

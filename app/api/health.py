@@ -41,7 +41,7 @@ async def healthz() -> Alive:
 
 @router.get(
     "/readyz",
-    summary="Are the workers warm, and is the database there?",
+    summary="Whether the workers are warm and the database answers",
     response_model=Ready,
     responses=problem_responses(NotReady, StoreUnavailable),
 )
@@ -77,7 +77,7 @@ class ClusterState(Response):
         None,
         "tcp://scheduler:8786",
     )
-    machines: list[Machine] = part("The machines that are there now.")
+    machines: list[Machine] = part("The machines connected now.")
 
 
 @router.get(

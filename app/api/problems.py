@@ -30,7 +30,7 @@ _STYLE = (
 
 @router.get(
     "/{slug}",
-    summary="What a type of problem means",
+    summary="Meaning of a problem type",
     response_class=HTMLResponse,
     responses=problem_responses(NotFound),
 )
@@ -65,7 +65,7 @@ def _page(slug: str) -> str:
         f"<style>{_STYLE}</style><main><h1>{escape(kind.title)}</h1>"
         f"<p><code>{slug}</code>, HTTP status {kind.status}</p>"
         f"<p>{_text(occasion(kind))}</p><p>{_text(kind.remedy)}</p>"
-        + (f"<h2>Fields of its own</h2><dl>{fields}</dl>" if fields else "")
+        + (f"<h2>Additional fields</h2><dl>{fields}</dl>" if fields else "")
         + f'<h2>Example</h2><pre tabindex="0">{escape(example)}</pre>'
         f'<p><a href="../help/reference/errors/#{slug}">All errors</a></p></main>'
     )

@@ -37,7 +37,7 @@ Examples:
     "wanted",
     type=click.Choice(["json", "csv", "moves"]),
     default="json",
-    help="Kind of the answer; `moves`: a table to read, measured against predicted.",
+    help="Kind of the answer; `moves`: a table of measured and predicted energies.",
 )
 @click.option(
     "--settings",
@@ -128,7 +128,7 @@ def settings_in(file: Path) -> dict[str, Any]:
 def moves_of(answer: dict[str, Any]) -> str:
     """A line per move, and per cycle of a log that repeats: predicted energy with its interval,
     measured energy, their difference."""
-    head = ("move", "start [s]", "time [s]", "predicted [J]", "likely [J]", "measured [J]", "by")
+    head = ("move", "start [s]", "time [s]", "predicted [J]", "interval [J]", "measured [J]", "by")
     rows: list[tuple[str, ...]] = [(*head, "difference")]
     parts = [(str(k), part) for k, part in enumerate(answer["segments"], 1)]
     parts += [(f"cycle {k}", part) for k, part in enumerate(answer["cycles"], 1)]

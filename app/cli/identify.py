@@ -83,8 +83,8 @@ Examples:
     "others",
     multiple=True,
     type=_Validation(),
-    help="What validates the figures, and no fit sees: another log, which may be repeated; a "
-    "fraction of the moves; or `moves`, each motion in its turn. Default: 0.3.",
+    help="Held-out data for the validation: another log, which may be repeated; a fraction of "
+    "the moves; or `moves`, each motion in turn. Default: 0.3.",
 )
 @click.option(
     "--term",
@@ -98,8 +98,8 @@ Examples:
 @click.option(
     "--refit/--keep",
     default=None,
-    help="Find the links' inertials, too, or keep the robot's own. Default: refit them to torques "
-    "measured behind the gears alone.",
+    help="Identify the links' inertials, too, or keep the robot's own. Default: refit them only "
+    "to torques measured behind the gears.",
 )
 @click.option(
     "--payload",
@@ -127,8 +127,8 @@ Examples:
     type=click.Choice(["json", "moves"]),
     default="json",
     show_default=True,
-    help="Kind of the answer; `moves`: a table to read, measured against predicted energy of the "
-    "moves that no fit has seen, and of their cycles.",
+    help="Kind of the answer; `moves`: a table of measured and predicted energies of the "
+    "held-out moves, and of their cycles.",
 )
 def identify(
     logs: tuple[Path, ...],
@@ -215,7 +215,7 @@ def _packed(file: Path) -> bytes:
 def moves_of(result: dict[str, Any]) -> str:
     """A line per held-out move, and per cycle of logs that repeat: predicted energy with its
     interval, measured energy, their difference."""
-    head = ("move", "log", "start [s]", "time [s]", "predicted [J]", "likely [J]", "measured [J]")
+    head = ("move", "log", "start [s]", "time [s]", "predicted [J]", "interval [J]", "measured [J]")
     rows: list[tuple[str, ...]] = [(*head, "difference")]
     validation = result["validation"] or {"energies": [], "cycles": []}
     for title, name in (("", "energies"), ("cycle ", "cycles")):
@@ -256,7 +256,7 @@ def summary_of(result: dict[str, Any]) -> dict[str, str]:
 def _errors(validation: dict[str, Any]) -> dict[str, str]:
     """The lines of the errors on moves that no fit has seen."""
     fitted, own, cycles = validation["fitted"], validation["own"], validation["cycles"]
-    lines = {"validated on": f"{validation['moves']} moves that no fit has seen"}
+    lines = {"validated on": f"{validation['moves']} held-out moves"}
     if fitted["torque"] is not None:
         lines["torque"] = (
             f"{_percent(fitted['torque'])} error, {_percent(own['torque'])} with the robot's own "

@@ -35,7 +35,7 @@ Examples:
 @click.option(
     "--pose",
     type=Target(),
-    help="Without FILE: the pose 'p[x,y,z,rx,ry,rz]' as of URScript, in m and rad.",
+    help="Without FILE: the pose 'p[x,y,z,rx,ry,rz]' as in URScript, in m and rad.",
 )
 @OUTPUT
 @FORMAT

@@ -139,8 +139,10 @@ def _changing(name: str, words: str) -> Callable[[Client, str], None]:
     )(change)
 
 
-cancel = _changing("cancel", "Cancels what waits of the job ID, and stops what runs.")
-retry = _changing("retry", "Lets what failed or was cancelled of the job ID wait again.")
+cancel = _changing(
+    "cancel", "Cancels the waiting requests of the job ID, and stops the running ones."
+)
+retry = _changing("retry", "Queues the failed and cancelled requests of the job ID again.")
 
 
 @jobs.command(

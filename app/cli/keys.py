@@ -32,7 +32,7 @@ Examples:
   joulepath keys remove press_shop --file keys.yaml"""
 )
 def keys() -> None:
-    """API keys of the HTTP service: makes, lists and removes them.
+    """Creates, lists and removes API keys of the HTTP service.
 
     A service with JOULEPATH_API_KEYS_FILE=FILE answers requests with a key of this file only. A
     running service applies a change from its next request on.
@@ -55,7 +55,7 @@ Example:
 )
 @_FILE
 def add(name: str, role: str, file: Path) -> None:
-    """Makes a key for the client NAME and writes it once to standard output.
+    """Creates a key for the client NAME and writes it once to standard output.
 
     The file holds its hash. Further keys of the same name are the same client: to replace a key,
     add another one, give it to the client, and remove the old one by its id.
@@ -85,7 +85,7 @@ Example:
 )
 @_FILE
 def list_keys(file: Path) -> None:
-    """Lists the keys: name, role, id and time. The keys themselves are nowhere."""
+    """Lists the keys: name, role, id and time. The keys themselves are not stored."""
     from joulepath.app.access.key_file import WrongKeyFile, read_keys
 
     try:

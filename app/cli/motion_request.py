@@ -64,8 +64,8 @@ def motion_options(command: Callable[..., Any]) -> Callable[..., Any]:
             "--from",
             "start",
             type=Target(),
-            help="Without FILE: where the motion starts. Joint positions '[…]' in rad or '[…]deg', "
-            "or a pose 'p[x,y,z,rx,ry,rz]' as of URScript, in m and rad.",
+            help="Without FILE: where the motion starts. Joint positions '[…]' in rad or "
+            "'[…]deg', or a pose 'p[x,y,z,rx,ry,rz]' as in URScript, in m and rad.",
         ),
         click.option("--to", "goal", type=Target(), help="Without FILE: where it ends."),
     ]
@@ -101,7 +101,7 @@ def body_of(file: str | None, fields: dict[str, Any], needed: dict[str, tuple[st
     if file is not None:
         if given:
             raise click.UsageError(
-                f"Give FILE or {', '.join(needed)}: what is in FILE cannot be changed by options."
+                f"Give FILE or {', '.join(needed)}: options cannot change the content of FILE."
             )
         return content_of(file)
     missing = [option for option, (_, value) in needed.items() if value is None]

@@ -51,8 +51,8 @@ Examples:
     "--perturb",
     type=(click.Choice(["payload", "friction"]), float),
     multiple=True,
-    help="Quantity that the controller does not know exactly, and the fraction by which it is less "
-    "and more.",
+    help="Quantity that the controller does not know exactly, and the fraction by which it is "
+    "decreased and increased.",
 )
 @click.option(
     "--deadline",

@@ -32,8 +32,8 @@ def robots(context: click.Context) -> None:
 
     The columns are the name, the title, the number of joints, the rated payload [kg], and the trust
     letters of the parameters behind energies. A: published by the manufacturer, B: fitted
-    to measured data, C: second-hand from a paper or another's file, T: transferred from a sister
-    robot, E: engineering default without a source.
+    to measured data, C: from a paper or a third party's file, second-hand, T: transferred from a
+    sister robot, E: engineering default without a source.
     """
     if context.invoked_subcommand is None:
         write(_table().encode(), None)

@@ -160,7 +160,7 @@ Example:
 @OUTPUT
 @ANSWERS
 def placement(file: str, output: Path | None, answers: Path | None) -> None:
-    """Finds where to put the robot, or what stands around it, for cycles of least energy.
+    """Finds the place of the robot, or of what surrounds it, for cycles of least energy.
 
     FILE is the JSON of `POST /placement`, or - for standard input. The answer is JSON, too. If
     standard error is a terminal, a summary follows: the best place, energy, saving and lower bound.
@@ -242,7 +242,7 @@ Example:
 @FILE
 @OUTPUT
 def advice(file: str, output: Path | None) -> None:
-    """Finds changes of a motion or a cycle that need less energy.
+    """Finds changes of a motion or a cycle that save energy.
 
     FILE is the JSON of `POST /advice`, or - for standard input. The answer is JSON, too. If
     standard error is a terminal, a summary follows: the energy as it is, and of each change.
@@ -272,7 +272,7 @@ Examples:
 @OUTPUT
 @FORMAT
 def excitation(file: str, output: Path | None, wanted: Literal["json", "csv"]) -> None:
-    """Finds a motion whose log tells an arm's parameters apart.
+    """Finds a motion whose log identifies an arm's parameters.
 
     FILE is the JSON of `POST /excitation`, or - for standard input. The answer is JSON, or a CSV
     with t, q, v and a. If standard error is a terminal, a summary follows.

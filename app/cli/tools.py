@@ -19,7 +19,7 @@ def tools(name: str | None) -> None:
     """Lists the grippers for the field `tool` of a request, or the figures of the gripper NAME.
 
     The trust letters are the same as in `joulepath robots`. A: published by the manufacturer, C:
-    second-hand, from a third party's file, E: engineering default without a source.
+    from a third party's file, second-hand, E: engineering default without a source.
     """
     from joulepath.models.tools.registry import tool_names
     from joulepath.optimizer.exceptions import UnknownTool

@@ -156,7 +156,7 @@ def paths_of_moves(answer: dict[str, Any]) -> list[str]:
     legs = [leg for leg in _Cycle.model_validate(answer).legs if leg.kind in MOVING]
     if any(leg.answer is None for leg in legs):
         raise InvalidProblem(
-            "answer", "The moves of the cycle are not kept: send the cycle to POST /cycle again."
+            "answer", "The moves of the cycle are not stored: send the cycle to POST /cycle again."
         )
     return [leg.answer for leg in legs if leg.answer is not None]
 
@@ -190,7 +190,8 @@ def _move(answer: dict[str, Any], arm: ArmRequest | None, label: str) -> Move:
     given = _Given.model_validate(answer)
     if given.samples is None:
         raise InvalidProblem(
-            "answer", "The answer has no samples: ask POST /evaluate for them by sample_period."
+            "answer",
+            "The answer has no samples: request them from POST /evaluate with sample_period.",
         )
     made = _arm(given.robot, given.arm, arm)
     return _checked(Move(_through(given.samples, made.robot.nq), made, label), given.samples)
@@ -206,12 +207,12 @@ def _arm(robot: str, own: dict[str, Any] | None, instead: ArmRequest | None) -> 
     if instead is not None:
         if "robot" in instead.model_fields_set and instead.robot != robot:
             raise InvalidProblem(
-                "arm.robot", f"The answer is of the robot {robot}: leave arm.robot out."
+                "arm.robot", f"The answer belongs to the robot {robot}: leave arm.robot out."
             )
         return to_arm(instead.model_copy(update={"robot": robot}))
     if own is None:
         raise InvalidProblem(
-            "arm", "The answer does not say which arm it is of: give `arm`, as in its request."
+            "arm", "The answer does not contain its arm: give `arm`, as in its request."
         )
     return to_arm(ArmRequest.model_validate({**own, "robot": robot}))
 

@@ -34,14 +34,14 @@ _REMEDIES = {
     "the decimal point",
     "number out of range": "the number has too many digits",
     "recursion limit exceeded": "it is nested too deep",
-    "invalid unicode code point": "this is not UTF-8: encode it so",
+    "invalid unicode code point": "this is not UTF-8: encode the body in UTF-8",
     "lone leading surrogate": "the second half of a character is missing: write \\u escapes in "
     "pairs",
     "unexpected end of hex escape": "the second half of a character is missing: write \\u escapes "
     "in pairs",
     "invalid escape": "write a backslash in a text as \\\\",
     "control character": "write line breaks and tabs in a text as \\n and \\t",
-    "EOF while parsing": "it ends too soon: a quote or a closing bracket is missing",
+    "EOF while parsing": "the document ends too soon: a quote or a closing bracket is missing",
     "expected `,`": "a comma or a closing bracket is expected here",
 }
 EMPTY = "The body is empty: send a JSON object"
@@ -71,7 +71,7 @@ def _message(said: str) -> str:
         name = f" `{repeated[1]}`" if PLAIN_NAME.fullmatch(repeated[1]) else ""
         return f"The field{name} is given twice in one object{place}: give it once"
     remedy = next((remedy for start, remedy in _REMEDIES.items() if what.startswith(start)), _OTHER)
-    return f"The body is no JSON{place}: {remedy}"
+    return f"The body is not JSON{place}: {remedy}"
 
 
 def _refused(message: str) -> InvalidRequest:

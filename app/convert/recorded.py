@@ -132,7 +132,7 @@ def told_by(log: Log, asked: S) -> S:
     """The request, completed by robot, payload and gravity of the log. Raises InvalidProblem."""
     given = asked.model_fields_set
     if "robot" in given and asked.robot != log.robot:
-        raise InvalidProblem("robot", f"The log is of the robot {log.robot}: leave robot out.")
+        raise InvalidProblem("robot", f"The log belongs to the robot {log.robot}: leave robot out.")
     own = {"robot": log.robot, "payload": _payload(log.payload), "gravity": log.gravity.tolist()}
     return asked.model_copy(
         update={name: value for name, value in own.items() if name not in given}

@@ -70,7 +70,8 @@ def with_figures(robot: Robot, id: str) -> Robot:
         raise UnknownFigures(id)
     if figures.robot != robot.name:
         raise InvalidProblem(
-            "figures", f"These figures are of the robot {figures.robot}: use this robot, or others."
+            "figures",
+            f"These figures belong to the robot {figures.robot}: use this robot, or other figures.",
         )
     try:
         return own_robot(robot.name, merged(robot.figures, figures.content))

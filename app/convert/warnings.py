@@ -13,7 +13,7 @@ from joulepath.optimizer.replay.shapes import unsimulated
 from joulepath.optimizer.result.certificate import Clearance
 from joulepath.optimizer.result.solution import Solution
 
-ADVICE = "Make sure that the arm and its cell are known as accurately, or ask for a margin."
+ADVICE = "Make sure that the arm and its cell are known with this accuracy, or give a margin."
 
 
 LITTLE_LEFT = 0.9
@@ -24,8 +24,8 @@ MISSED = (
     "missing."
 )
 DIVIDED = (
-    "{} is where the path is divided, at {:.1%} of its length: no arm configuration follows it "
-    "whole. `status` and `lower_bound` are for this division."
+    "{} is where the path is divided, at {:.1%} of its length, because no arm configuration "
+    "follows the whole path. `status` and `lower_bound` are for this division."
 )
 STAND_INS = {
     TOOL: f"a rod of {1e3 * StandInSettings.tool_radius:g} mm radius from the flange to the TCP",
@@ -36,7 +36,7 @@ STAND_INS = {
 SHAPES = {TOOL: "tool.capsules", PAYLOAD: "payload.shape"}
 AT_EDGE = "The best place is at an end of the range of {}: a wider region may have a better one."
 JOINT_POSITIONS = (
-    "These stops are given by joint positions, which stay the same wherever the base stands: {}."
+    "These stops are given by joint positions, which stay the same wherever the base is: {}."
 )
 NO_DEFAULT_MOTION = (
     "No default motion of the robot's controller is known: `controller_default` is left out."
@@ -67,7 +67,7 @@ def replay_warnings(planned: PlannedMotion, found: Replay) -> list[str]:
     arm = planned.arm
     said = [
         f"{name} has many parts and is not simulated: contacts with it are not found. The "
-        "certificate counts it."
+        "certificate includes it."
         for name in unsimulated(arm)
     ]
     for run in found.runs:
@@ -110,7 +110,7 @@ def _close(pair: tuple[str, str], distance: float, time: float, proven: str) -> 
 def _unmodelled(contact: Clearance) -> str:
     obstacle, carried = contact.pair
     return (
-        f"The {carried} has no shape, and nothing keeps it out of the obstacles: "
+        f"The {carried} has no shape, so it is not kept away from obstacles: "
         f"{STAND_INS[carried]} would be {-1e3 * contact.sampled:.0f} mm deep in {obstacle} at "
         f"{contact.time:.3f} s. Give its shape in `{SHAPES[carried]}`."
     )

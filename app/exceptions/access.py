@@ -67,8 +67,8 @@ class NotOwner(ServiceError):
     def __str__(self) -> str:
         whose = "nobody with a key" if self.owner is None else f"another client, {self.owner},"
         return (
-            f"This was created by {whose} and only its owner or an admin may change it: use such a "
-            "key."
+            f"This was created by {whose} and only its owner or an admin may change it: use the "
+            "key of one of them."
         )
 
 
@@ -102,6 +102,6 @@ class WrongHost(ServiceError):
         "`JOULEPATH_ALLOWED_HOSTS`."
     )
     detail = (
-        "The name in the header Host is none of this service: use its address, or have the name "
-        "added to JOULEPATH_ALLOWED_HOSTS."
+        "The name in the header Host is not a name of this service: use its address, or have "
+        "the name added to JOULEPATH_ALLOWED_HOSTS."
     )

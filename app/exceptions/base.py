@@ -24,7 +24,7 @@ class FieldError(TypedDict):
 
 @dataclass(eq=False)
 class InvalidRequest(ServiceError):
-    """The request is malformed or contradicts itself. The body is no JSON, or a field is missing,
+    """The request is malformed or contradicts itself. The body is not JSON, or a field is missing,
     unknown, of the wrong type or length, out of range, or not finite. A payload beyond the robot's
     rating, a limit wider than the robot's, a deadline above the maximum and too many candidates
     belong here, too."""

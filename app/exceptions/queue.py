@@ -7,7 +7,7 @@ from joulepath.app.exceptions.base import ServiceError
 
 class Busy(ServiceError):
     """All workers are taken and the queue is full, too many requests of jobs wait, or the service
-    has as many connections, or bytes of bodies and answers in flight, as it may."""
+    has reached its limit of connections, or of bytes of bodies and answers in flight."""
 
     status = 503
     retry_after = 2
@@ -19,15 +19,15 @@ class Busy(ServiceError):
 class TooManyConnections(Busy):
     """The service has as many connections as it may."""
 
-    detail = "The service has as many connections as it may: try again after a few seconds."
+    detail = "The service has reached its limit of connections: try again after a few seconds."
 
 
 class TooManyBytes(Busy):
     """Bodies and answers in flight have as many bytes as the service may hold."""
 
     detail = (
-        "The service holds as many bytes of requests and answers as it may: try again after a few "
-        "seconds."
+        "The service has reached its limit of bytes of requests and answers: try again after a "
+        "few seconds."
     )
 
 
@@ -52,8 +52,8 @@ class TooManyRequests(Busy):
         "time [s] in the header `Retry-After`."
     )
     detail = (
-        "You have as many requests in flight as one client may: wait for their answers before you "
-        "send more, or send them one after another."
+        "You have reached the limit of requests in flight per client: wait for their answers "
+        "before you send more, or send them one after another."
     )
 
 
@@ -61,9 +61,9 @@ class TooManyConnectionsOfClient(TooManyRequests):
     """The client has as many connections, or requests without a complete answer, as it may."""
 
     detail = (
-        "You have as many connections, or as many requests without a complete answer, as one "
-        "client may: close those that you do not need, such as streams of events, and use one for "
-        "several requests, one after another."
+        "You have reached the limit of connections, or of requests without a complete answer, "
+        "per client: close those that you do not need, such as streams of events, and use one "
+        "for several requests, one after another."
     )
 
 
@@ -71,9 +71,9 @@ class TooManyWaitingOfClient(TooManyRequests):
     """The client's requests of jobs that wait are half of those that the others leave room for."""
 
     detail = (
-        "Your jobs would have more waiting requests than one client may, which is half of what the "
-        "other clients leave: send this job again when others of yours have ended, or send a "
-        "smaller one."
+        "Your jobs would have more waiting requests than allowed per client, which is half of "
+        "what the other clients leave: send this job again when others of yours have ended, or "
+        "send a smaller one."
     )
 
 
@@ -81,8 +81,8 @@ class TooManyBytesOfClient(TooManyRequests):
     """The client's bodies and answers in flight have as many bytes as one client may."""
 
     detail = (
-        "The bodies and answers of your requests in flight have as many bytes as one client may: "
-        "wait for their answers, read them, and send fewer at a time."
+        "The bodies and answers of your requests in flight have reached the limit of bytes per "
+        "client: wait for their answers, read them, and send fewer at a time."
     )
 
 

@@ -9,7 +9,7 @@ class NoTypst(ServiceError):
     """The package for PDF files, Typst, is not installed."""
 
     status = 501
-    title = "No PDF here"
+    title = "PDF not available"
     remedy = (
         "Ask for `html` and print the page from the browser; or install Typst by `pip install "
         "'joulepath[report]'`."

@@ -73,8 +73,8 @@ class PartsNeeded(UnknownAnswer):
     """An export refers to missing kept answers."""
 
     detail = (
-        "The answer refers to kept answers that are not at hand: export it where the service keeps "
-        "them."
+        "The answer refers to stored answers that are not available here: export it where the "
+        "service stores them."
     )
 
     names: Annotated[list[str], Internal]
@@ -170,8 +170,8 @@ class TooManyRobots(ServiceError):
     title = "Too many robots"
     remedy = "Delete one of yours that is not used with `DELETE /robots/{name}`."
     detail = (
-        "The service holds as many added robots as it may, or you have added half of what other "
-        "clients leave: delete one that is not used."
+        "The service has reached its limit of added robots, or you have added half of what "
+        "other clients leave: delete one that is not used."
     )
 
 
@@ -235,7 +235,8 @@ class UnknownIdentification(ServiceError):
     title = "Unknown identification"
     remedy = "Send it again with `POST /identifications`."
     detail = (
-        "No identification has this id: it may be older than the service keeps jobs. Send it again."
+        "No identification has this id: it may have been deleted because of its age. Send the "
+        "request again."
     )
 
 
@@ -271,7 +272,7 @@ class TooManyFigures(ServiceError):
     title = "Too many figures"
     remedy = "Delete some of yours that are not used with `DELETE /figures/{id}`."
     detail = (
-        "The service holds as many figures as it may, or you have stored half of what other "
+        "The service has reached its limit of figures, or you have stored half of what other "
         "clients leave: delete some that are not used."
     )
 

@@ -15,7 +15,7 @@ class NotFound(ServiceError):
     status = 404
     title = "Not found"
     remedy = "Use one of the paths that `GET /openapi.json` lists."
-    detail = "This path does not exist: leave out a slash at its end; GET /openapi.json lists all."
+    detail = "This path does not exist: leave out a slash at its end. See GET /openapi.json."
 
 
 class PagesNotBuilt(ServiceError):
@@ -146,16 +146,17 @@ class UnsupportedCoding(ServiceError):
 
 
 class MalformedHttp(ServiceError):
-    """The received bytes are no valid HTTP/1.1 request: a TLS handshake, a request line or header
-    with invalid characters, two lengths of the body, or a chunk without a length. The service
-    closes the connection."""
+    """The received bytes are not a valid HTTP/1.1 request: a TLS handshake, a request line or
+    header with invalid characters, two lengths of the body, or a chunk without a length. The
+    service closes the connection."""
 
     status = 400
     title = "Malformed HTTP"
     remedy = "Speak HTTP to this port, or HTTPS to the proxy before it."
     detail = (
-        "What arrived is no HTTP/1.1 request: check the address and that the client speaks HTTP, "
-        "not HTTPS, to this port, and the request line, the headers and the chunks of the body."
+        "What arrived is not an HTTP/1.1 request: check the address and that the client speaks "
+        "HTTP, not HTTPS, to this port, and the request line, the headers and the chunks of the "
+        "body."
     )
 
 

@@ -85,7 +85,7 @@ class _Now(Collector):
         gauges = {
             "joulepath_queue_length": ("Requests that wait for a worker.", len(queue.waiting)),
             "joulepath_queue_oldest_seconds": (
-                "Time for which the oldest of them has waited.",
+                "Time for which the oldest waiting request has waited.",
                 queue.oldest,
             ),
             "joulepath_workers_warm": (
@@ -93,7 +93,7 @@ class _Now(Collector):
                 self._engine.warm_workers,
             ),
             "joulepath_workers_busy": ("Workers that run a request.", queue.busy),
-            "joulepath_ready": ("Whether /readyz says ready.", self._ready),
+            "joulepath_ready": ("Whether /readyz reports ready.", self._ready),
             "joulepath_store_up": ("Whether the database answers.", self._store_up),
         }
         for name, (text, value) in gauges.items():

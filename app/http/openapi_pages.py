@@ -7,14 +7,17 @@ from __future__ import annotations
 from typing import Any
 
 _TAGS = {
-    "robots": ("What arm, tool and figures there are, and your own.", "robots"),
-    "motion": ("The motion or cycle of least energy, and what a given motion needs.", "optimize"),
+    "robots": ("Robots, tools and figures, including your own.", "robots"),
+    "motion": (
+        "Motions and cycles of least energy, and energies of given motions.",
+        "optimize",
+    ),
     "results": ("Programs for controllers, reports and stored answers.", "export"),
-    "jobs": ("Many requests, which run while nobody waits.", "jobs"),
+    "jobs": ("Many requests that run in the background.", "jobs"),
     "studies": ("Series of experiments on a real arm, with suggestions.", "studies"),
     "logs": ("The figures of your own arm, from its logs.", "identification"),
-    "health": ("Whether the service works, and what it has to do.", "deployment"),
-    "problems": ("What a type of problem means.", "errors"),
+    "health": ("State and load of the service.", "deployment"),
+    "problems": ("Meaning of problem types.", "errors"),
 }
 """Text and page of each tag, in the order in which an arm becomes a running program."""
 _PAGES = {

@@ -108,8 +108,8 @@ def pose_target(
         known = ", ".join(sorted(frame for frame in frames if frame))
         raise refusal(
             (topic, "header", "frame_id"),
-            f"The frame {frame_id!r} is none of the robot's base: transform the pose into one of "
-            f"{known}, or set the parameter `base_frame`.",
+            f"The frame {frame_id!r} is not a frame of the robot's base: transform the pose into "
+            f"one of {known}, or set the parameter `base_frame`.",
         )
     return {
         "pose": {

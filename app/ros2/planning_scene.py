@@ -63,7 +63,9 @@ class PlanningScene:
 
     def _take_over(self, message: Any) -> None:
         if message.world.octomap.octomap.data:
-            raise self._refused("world.octomap", "An octomap is no obstacle here: send objects.")
+            raise self._refused(
+                "world.octomap", "Octomaps are not supported as obstacles: send objects."
+            )
         if message.robot_state.attached_collision_objects:
             raise self._refused(
                 "robot_state.attached_collision_objects",
@@ -114,8 +116,8 @@ class PlanningScene:
         if message.header.frame_id not in self._frames:
             raise self._refused(
                 f"world.collision_objects.{message.id}.header.frame_id",
-                f"The frame {message.header.frame_id!r} is none of the robot's base: "
-                f"send objects in one of {', '.join(sorted(filter(None, self._frames)))}.",
+                f"The frame {message.header.frame_id!r} is not a frame of the robot's base: send "
+                f"objects in one of {', '.join(sorted(filter(None, self._frames)))}.",
             )
         known = objects.get(message.id)
         if operation == MOVE:
@@ -160,7 +162,7 @@ class PlanningScene:
             return {"shape": shape, "length": sizes[0], "radius": sizes[1]}
         raise self._refused(
             f"world.collision_objects.{name}.primitives",
-            f"A primitive of type {solid.type} with {len(sizes)} dimensions is none that is read: "
+            f"A primitive of type {solid.type} with {len(sizes)} dimensions is not supported: "
             "send a box, sphere, cylinder or mesh.",
         )
 

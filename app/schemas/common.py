@@ -84,8 +84,8 @@ class Answer(Response):
         "Id of the request, as in the header `X-Request-ID`.", None, REQUEST_ID
     )
     id: str | None = described(
-        "Id of this answer: `GET /answers/{id}` returns it again, and exports and replays take it. "
-        "Null if it is not kept.",
+        "Id of this answer: `GET /answers/{id}` returns it again, and exports and replays take "
+        "it. Null if it is not stored.",
         None,
         ANSWER_ID,
     )
@@ -96,8 +96,8 @@ class MotionAnswer(Answer):
     """The fields of an answer that is a motion."""
 
     arm: dict[str, Any] | None = described(
-        "What the request says of the arm beside its robot: payload, limits, scene, ... as it was "
-        "sent. Null if that is larger than 64 KiB of JSON.",
+        "Fields of the request on the arm, without its robot: payload, limits, scene, ... as "
+        "sent. Null if they are larger than 64 KiB of JSON.",
         None,
         {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
     )

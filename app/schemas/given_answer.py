@@ -16,9 +16,9 @@ class AnswerRequest(Request):
     """A motion of an earlier answer."""
 
     answer: str | dict[str, Any] = described(
-        "A motion: the id (or the path) of a kept answer, or a whole answer, of `POST /optimize`, "
-        "`POST /cycle` or `POST /evaluate` with `sample_period`; a point of a front and a study's "
-        "iteration by their `answer`.",
+        "A motion: the id (or the path) of a stored answer, or a whole answer, of `POST "
+        "/optimize`, `POST /cycle` or `POST /evaluate` with `sample_period`; a point of a front "
+        "and a study's iteration by their `answer`.",
         None,
         ANSWER_ID,
     )
@@ -40,6 +40,6 @@ class AnswerRequest(Request):
             and not isinstance(data["answer"], str | dict)
         ):
             raise PydanticCustomError(
-                "answer", "answer must be the id of a kept answer, or a whole answer"
+                "answer", "answer must be the id of a stored answer, or a whole answer"
             )
         return data

@@ -97,8 +97,8 @@ class NewJob(Request):
     """Requests computed in the background."""
 
     requests: list[RequestOfJob] = described(
-        "The requests, in any mixture. `deadline` counts from the begin of the work on a request. "
-        "It may exceed the deadline of a synchronous request, up to "
+        "The requests, in any mixture. `deadline` counts from the start of the work on a "
+        "request. It may exceed the deadline of a synchronous request, up to "
         "`JOULEPATH_MAX_JOB_DEADLINE`.",
         None,
         [{"optimize": OPTIMIZE}, {"evaluate": EVALUATE}],
@@ -107,8 +107,8 @@ class NewJob(Request):
     )
     name: Name | None = described("Name of the job.", None, "Night run, cell 4", default=None)
     keep_going: bool = described(
-        "Whether the other requests go on after one has failed. If not, the first failure cancels "
-        "them.",
+        "Whether the other requests continue after one has failed. If not, the first failure "
+        "cancels them.",
         None,
         True,
         default=True,

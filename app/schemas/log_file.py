@@ -26,7 +26,7 @@ class LogColumns(Request):
 
     time: _Column = described("Times [s].", None, "time_s")
     nanoseconds: _Column | None = described(
-        "Nanoseconds beside times in whole seconds.", None, "nsecs", default=None
+        "Nanoseconds that complete times in whole seconds.", None, "nsecs", default=None
     )
     q: _Columns = described("Joint positions.", None, ["axis_1", "axis_2"])
     v: _Columns | None = described("Joint velocities.", None, ["speed_1", "speed_2"], default=None)
@@ -70,7 +70,7 @@ class LogFile(Request):
     current_units: Literal["A", "mA"] = described("Unit of currents.", None, "A", default="A")
     effort: Literal["auto", "current", "torque", "external"] = described(
         "What the efforts are: motor currents, torques at the joints, or torques from outside, "
-        "without gravity. `auto` finds it out.",
+        "without gravity. `auto` detects it.",
         None,
         "auto",
         default="auto",

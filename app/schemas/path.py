@@ -13,15 +13,15 @@ from joulepath.app.schemas.orientation import Axis, ConeOrientedPose, TargetPose
 from joulepath.optimizer.problem.line import LINE_RANGES
 from joulepath.optimizer.problem.tool_path import MOST_POINTS, TOOL_PATH, PathShape
 
-SPEED = "Largest speed of the TCP on the way. Null: as fast as the limits allow."
+SPEED = "Largest speed of the TCP along the path. Null: as fast as the limits allow."
 
 
 class SpeedRange(Request):
     """Bounds on the speed of the TCP along a path."""
 
     min: Speed | None = described(
-        "Smallest speed, but for the ramps at both ends, where the arm comes from rest and to "
-        "rest. Null: no bound.",
+        "Smallest speed, except on the ramps at both ends, where the arm starts from rest and "
+        "comes to rest. Null: no bound.",
         "m/s",
         0.1,
         default=None,
@@ -93,10 +93,10 @@ class PathTolerance(Request):
         le=0.5,
     )
     about: Axis | None = described(
-        "Axis of the TCP, of any length, about which the tool may turn on the way: as the arm must "
-        "to follow the path, and as needs least energy. `rotation` is for the direction of this "
-        "axis then. At both ends the tool has its full orientation, unless that is `free_about` "
-        "the same axis. Null: the orientation is that of the path.",
+        "Axis of the TCP, of any length, about which the tool may turn along the path, as the "
+        "arm must and as needs the least energy. `rotation` then limits the direction of this "
+        "axis. At both ends, the tool has its full orientation, unless it is `free_about` the "
+        "same axis. Null: the orientation is that of the path.",
         "1",
         [0.0, 0.0, 1.0],
         default=None,
@@ -113,9 +113,9 @@ class _OnPath(Request):
         default="lines",
     )
     blend: float = described(
-        "Length of path before and after each pose between start and end on which a smooth curve "
-        "replaces the corner of two lines. Needed where there are such poses, as the arm cannot "
-        "turn a sharp corner without a stop.",
+        "Length of path before and after each pose between start and end on which a smooth "
+        "curve replaces the corner of two lines. Required if there are such poses, because the "
+        "arm cannot turn a sharp corner without a stop.",
         "m",
         0.02,
         default=0.0,
@@ -123,13 +123,14 @@ class _OnPath(Request):
         le=1,
     )
     tolerance: PathTolerance = described(
-        "By how much the motion may be off the path.",
+        "Largest deviation of the motion from the path.",
         None,
         {"position": 1e-4, "rotation": 2e-3},
         default=PathTolerance(),
     )
     speed: PathSpeed | None = described(
-        "Largest speed of the TCP on the way, or bounds on it. Null: as fast as the limits allow.",
+        "Largest speed of the TCP along the path, or bounds on it. Null: as fast as the limits "
+        "allow.",
         "m/s",
         0.1,
         default=None,

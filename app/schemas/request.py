@@ -34,8 +34,8 @@ def which_candidates() -> Any:
     """The field `candidates` of a request."""
     return described(
         "Candidates that the answer lists. `computed`: those for which a motion was computed, "
-        "found or not (`solved`, `failed`, and `pruned` on the way). `all`: also those that were "
-        "ruled out or not reached, thousands for two poses. `none`: no candidates. "
+        "found or not (`solved`, `failed`, and `pruned` during the search). `all`: also those that "
+        "were ruled out or not reached, thousands for two poses. `none`: no candidates. "
         "`candidate_counts` counts all of them in any case.",
         None,
         "all",
@@ -219,8 +219,7 @@ class MotionRequest(ArmRequest):
         default=None,
     )
     windings: bool = described(
-        "Whether full-turn alternatives q + 2πk within the joint range are candidates of their "
-        "own.",
+        "Whether full-turn alternatives q + 2πk within the joint range are separate candidates.",
         None,
         True,
         default=True,
@@ -264,20 +263,20 @@ class OptimizeRequest(MotionRequest):
 
     method: MethodName = described(
         "How the motion is parametrised. `bspline`: one B-spline per joint. `time_scaling`: the "
-        "straight line in joint space with an optimised time scaling. `lagrange`: one polynomial "
-        "per joint, given by its values at Chebyshev nodes. `uniform_scaling`: the time-optimal "
-        "motion, uniformly slowed down. `polynomial_ga`: one polynomial per joint, found by a "
-        "genetic algorithm for at most three candidates; it takes seconds, and its `status` is "
-        "never `optimal`. Every method goes around obstacles; where their own path collides, "
-        "`time_scaling` and `uniform_scaling` follow a planned path.",
+        "straight line in joint space with an optimised time scaling. `lagrange`: one "
+        "polynomial per joint, given by its values at Chebyshev nodes. `uniform_scaling`: the "
+        "time-optimal motion, uniformly slowed down. `polynomial_ga`: one polynomial per joint, "
+        "found by a genetic algorithm for at most three candidates; it takes seconds, and its "
+        "`status` is never `optimal`. Every method avoids obstacles; where their own path "
+        "collides, `time_scaling` and `uniform_scaling` follow a planned path.",
         None,
         "bspline",
         default="bspline",
     )
     path: Path | None = described(
-        "How the TCP goes from `start` to `goal`, which are joint positions or one pose each then. "
-        "The orientation of either may be `free_about` the axis `tolerance.about`. `method` and "
-        "`windings` do not matter. Null: the motion is free.",
+        "Path of the TCP from `start` to `goal`, each of which must then be joint positions or "
+        "one pose. The orientation of either may be `free_about` the axis `tolerance.about`. "
+        "`method` and `windings` have no effect. Null: the motion is free.",
         None,
         {"tolerance": {"position": 1e-4}},
         default=None,

@@ -230,7 +230,7 @@ class CellRequest(RobotWithTcp):
     ] = described(
         "Shape of the tool, for collision checking; or the name of a tool from `GET /tools`. A "
         "name also gives the TCP, unless `tcp` is given, and adds the tool's mass to every "
-        "payload, which is then the part alone.",
+        "payload, which then contains only the part.",
         None,
         "robotiq_2f_85",
         default=Tool(),

@@ -188,8 +188,8 @@ def _payload(base: Base) -> Iterator[Proposal]:
             nearer["inertia"] = inertia_row(body)
         yield Proposal(
             "payload",
-            "Grip the payload so that its centre of mass is at half its present distance from the "
-            "flange.",
+            "Grip the payload so that its centre of mass is at half its current distance from "
+            "the flange.",
             base.request | {"payload": nearer},
         )
 

@@ -35,5 +35,7 @@ def kept_answers(names: list[str]) -> list[Any]:
 def _document(body: bytes) -> Any:
     content = orjson.loads(body)
     if not isinstance(content, dict):
-        raise InvalidRequest([{"loc": ["body", "answer"], "msg": "This kept answer is no motion"}])
+        raise InvalidRequest(
+            [{"loc": ["body", "answer"], "msg": "This stored answer is not a motion"}]
+        )
     return content

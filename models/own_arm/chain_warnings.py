@@ -42,9 +42,9 @@ def chain_warnings(chain: Chain, upright: UprightChain) -> list[str]:
         )
     if chain.idle:
         warnings.append(
-            f"Joints beside the chain that mimic moving ones: {listed(chain.idle)}. They are held, "
-            "so that their links do not move as those of the arm do: neither their mass nor their "
-            "shape. Their positions can be given in `locked`."
+            f"Joints beside the chain that mimic moving ones: {listed(chain.idle)}. They are "
+            "held at fixed positions, so neither the mass nor the shape of their links moves as "
+            "on the real arm. Their positions can be given in `locked`."
         )
     if chain.facts.endless:
         warnings.append(
@@ -53,8 +53,9 @@ def chain_warnings(chain: Chain, upright: UprightChain) -> list[str]:
         )
     if chain.coarse:
         warnings.append(
-            f"Joints with angles of 1.57 or 3.14: {listed(chain.coarse)}. They are read as they "
-            "stand, so that the axes are not at right angles. Write 1.5708 and 3.1416 if they are."
+            f"Joints with angles of 1.57 or 3.14: {listed(chain.coarse)}. They are read as "
+            "written, so that the axes are not at right angles. Write 1.5708 and 3.1416 if they "
+            "are."
         )
     return [*warnings, *_shared_axes(chain, upright)]
 

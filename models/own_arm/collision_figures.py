@@ -78,11 +78,11 @@ def shape_figures(
         )
     if shapes.missing:
         warnings.append(
-            "Meshes that were not given, or are no STL, OBJ or COLLADA file, count as nothing: "
+            "Meshes that are missing, or are not STL, OBJ or COLLADA files, are ignored: "
             f"{_listed(shapes.missing)}."
         )
     if shapes.unknown:
-        warnings.append(f"Shapes that are not read count as nothing: {_listed(shapes.unknown)}.")
+        warnings.append(f"Unsupported shapes are ignored: {_listed(shapes.unknown)}.")
     named = zip([BASE, *links], covers, strict=True)
     hulls = {name: cover.hulls for name, cover in named if cover.hulls}
     return {"collision": figures} | _hull_figures(description, hulls)
@@ -110,7 +110,7 @@ def _doubt(meeting: MeetingPairs, chain: Chain) -> str:
     )
     return (
         f"The shapes of {', '.join(f'{a} and {b}' for a, b in doubtful)} meet in many random "
-        "configurations, and may leave hardly a motion free. If these links cannot touch on the "
+        "configurations, and may exclude nearly all motions. If these links cannot touch on the "
         f"arm, give `collision.never_meet`: {json.dumps(every)}."
     )
 

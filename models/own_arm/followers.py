@@ -98,8 +98,8 @@ def _row(
         if mimic.leader not in names:
             refuse(
                 "urdf",
-                f"Joint {leader!r} mimics {mimic.leader!r}, which is no moving joint between base "
-                f"and tip: give the position of {leader!r} in `locked`.",
+                f"Joint {leader!r} mimics {mimic.leader!r}, which is not a moving joint between "
+                f"base and tip: give the position of {leader!r} in `locked`.",
             )
         passed.add(leader)
         multiplier, offset = multiplier * mimic.multiplier, multiplier * mimic.offset + offset

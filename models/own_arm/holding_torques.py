@@ -90,10 +90,10 @@ class HoldingTorques:
             if limit < torque
         ]
         strong = [
-            f"Joint {joint!r} has a torque limit of {limit:.4g} N·m, and the arm with its payload "
-            f"needs {torque:.3g} N·m for gravity and acceleration. It is likely a placeholder: "
-            f"friction, rotor and copper loss are ruled from {SETTINGS.usual:g} times the needed "
-            "torque. Give `torque` or `drives`."
+            f"Joint {joint!r} has a torque limit of {limit:.4g} N·m, and the arm with its "
+            f"payload needs {torque:.3g} N·m for gravity and acceleration. It is likely a "
+            f"placeholder: friction, rotor and copper loss are estimated from {SETTINGS.usual:g} "
+            "times the needed torque. Give `torque` or `drives`."
             for joint, torque, limit, is_placeholder in zip(
                 joints, self.needed, tau_max, self._are_placeholders(tau_max), strict=True
             )

@@ -32,7 +32,7 @@ def check_held(tree: UrdfTree, name: str) -> None:
     if kind in ("floating", "planar"):
         refuse(
             "locked",
-            f"Joint {name!r} is {kind}: no single position holds it. Make it fixed instead.",
+            f"Joint {name!r} is {kind}, so no single position can hold it: make it fixed instead.",
         )
 
 
@@ -109,12 +109,12 @@ def check_rest(tree: UrdfTree, moving: Sequence[Element], locked: Mapping[str, f
     if len(loose) == 1:
         refuse(
             "locked",
-            f"Joint {loose[0]!r} moves a link beside those to the tip: give its position in "
-            '`locked`, or "others" to hold it at zero.',
+            f"Joint {loose[0]!r} moves a link that is not between base and tip: give its "
+            'position in `locked`, or "others" to hold it at zero.',
         )
     if loose:
         refuse(
             "locked",
-            f"Joints move links beside those to the tip: {listed(loose)}. Give their positions in "
-            '`locked`, or "others" to hold them all at zero.',
+            f"Joints move links that are not between base and tip: {listed(loose)}. Give their "
+            'positions in `locked`, or "others" to hold them all at zero.',
         )

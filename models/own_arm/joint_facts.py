@@ -79,9 +79,9 @@ class JointFacts:
             if getattr(given, field) is None and doubtful.any():
                 names = [name for name, each in zip(joints, doubtful, strict=True) if each]
                 found.append(
-                    f"Joints whose `{attribute}` in the URDF is far from that of usual drives, as "
-                    f"a simulator's placeholder is: {listed(names)}. It is taken as written; give "
-                    f"`drives.{field}` to replace it."
+                    f"Joints whose `{attribute}` in the URDF is far from that of common drives, "
+                    f"and may be a simulator's placeholder: {listed(names)}. It is taken as "
+                    f"written; give `drives.{field}` to replace it."
                 )
         if self.ignored:
             found.append(f"Elements of the URDF without effect: {listed(self.ignored)}.")

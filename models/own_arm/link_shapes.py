@@ -232,7 +232,8 @@ class LinkShapes:
         points = points * scale
         if not np.ptp(points, axis=0).max() < PLAUSIBLE.mesh:
             raise InvalidArm(
-                "meshes", f"{where} larger than {PLAUSIBLE.mesh:g} m: has the URDF its `scale`?"
+                "meshes",
+                f"{where} larger than {PLAUSIBLE.mesh:g} m: does the URDF give its `scale`?",
             )
         with _of_field("meshes"):
             check_surface(f"{where} that", points)

@@ -63,7 +63,7 @@ def _unpacked(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Iterator[byte
 
 
 def _no_zip(error: Exception) -> InvalidArm:
-    return InvalidArm("meshes", "The meshes are no zip that can be read: pack them again.")
+    return InvalidArm("meshes", "The meshes are not a readable zip: pack them again.")
 
 
 def in_folder(folder: Path, urdf: str) -> dict[str, bytes]:

@@ -62,7 +62,7 @@ def read_description(path: Path) -> Description:
         # The strict validator accepts JSON lists as tuples.
         found = _DESCRIPTION.validate_json(json.dumps(data))
     except (yaml.YAMLError, UnicodeDecodeError, TypeError) as error:
-        raise InvalidArm("", f"{path.name} is no description in YAML: {error}") from None
+        raise InvalidArm("", f"{path.name} is not a description in YAML: {error}") from None
     except ValidationError as error:
         raise _first(error) from None
     urdf = path.parent / found.urdf

@@ -55,7 +55,7 @@ def numbers(
     except ValueError:
         values = np.zeros(0)
     if values.shape != (count,) or not np.isfinite(values).all():
-        no_such = "no finite number" if count == 1 else f"not {count} finite numbers"
+        no_such = "not a finite number" if count == 1 else f"not {count} finite numbers"
         raise InvalidArm(
             "urdf",
             f"{where} with the attribute `{part}` that is {no_such}, but {text[:40]!r}: correct "

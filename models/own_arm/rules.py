@@ -54,9 +54,10 @@ NOTES = {
     "viscous": "0.055 times the greatest torque, as in strain-wave gears. Range 0.3 to 3 times.",
     "copper": "0.5 W/(N·m)² over the greatest torque. Range 0.4 to 2.5 times.",
     "idle_power": "6 W for each joint. Range 3 to 15 W.",
-    "controller_power": "Not counted: give the figure of the control box.",
+    "controller_power": "Not included: give the figure of the control box.",
     "regeneration": "Nothing is taken back.",
-    "torque_side": "Of the motor, friction and rotor included: nearly always the tighter reading.",
+    "torque_side": "Of the motor, friction and rotor included: nearly always the tighter "
+    "interpretation.",
     "jerk": "20 times the acceleration limit, in 1/s.",
     "torque_constant": "Without effect on the energy: copper loss is scaled with its square.",
     "gear_ratio": "Without effect on the energy: all figures are behind the gear.",

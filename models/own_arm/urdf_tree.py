@@ -80,8 +80,8 @@ class UrdfTree:
         if not links:
             refuse(
                 "urdf",
-                "The URDF has no <link>. A file of macros alone makes no arm: name the one that "
-                "uses them.",
+                "The URDF has no <link>. A file with only macros describes no arm: name the "
+                "file that uses them.",
             )
         above, problems = dict[str, Element](), Problems()
         for name, joint in joints.items():
@@ -103,9 +103,7 @@ class UrdfTree:
             front = [child for link in front for child in below.get(link, ())]
             reached.update(front)
         if loose := [link for link in links if link not in reached]:
-            refuse(
-                "urdf", f"Links hang on each other in a loop: {listed(loose)}. A URDF is a tree."
-            )
+            refuse("urdf", f"Links form a loop: {listed(loose)}. A URDF is a tree.")
         return UrdfTree(tuple(links), joints, above, roots[0])
 
     def path(self, base: str, tip: str) -> list[Element]:
@@ -115,8 +113,8 @@ class UrdfTree:
             if link not in self.above:
                 refuse(
                     "tip",
-                    f"The tip {tip!r} is not carried by the base {base!r}: name a base that it "
-                    "hangs on.",
+                    f"The tip {tip!r} is not connected to the base {base!r}: name a base that "
+                    "carries it.",
                 )
             found.append(self.above[link])
             link = joint_end(found[-1], "parent")
@@ -169,8 +167,8 @@ def _hang(
         other = name_of(above[child])
         refuse(
             "urdf",
-            f"Link {child!r} hangs on two joints, {other!r} and {name!r}: a URDF is a tree. Remove "
-            "one of them.",
+            f"Link {child!r} is the child of two joints, {other!r} and {name!r}: a URDF is a "
+            "tree. Remove one of them.",
         )
     above[child] = joint
 

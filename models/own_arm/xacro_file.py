@@ -51,7 +51,7 @@ def expanded(path: Path, arguments: Mapping[str, str], folders: Sequence[Path]) 
         cause = error.__context__ if missing else error
         raise InvalidArm(
             "urdf",
-            f"xacro does not expand {path.name}: {cause}. Give the folder of missing packages in "
+            f"xacro cannot expand {path.name}: {cause}. Give the folder of missing packages in "
             "`packages`, and values of arguments in `arguments`.",
         ) from None
 

@@ -283,7 +283,8 @@ def _check_bodies(inertials: dict[str, Any]) -> None:
         slack = DOCUMENT.rounded * abs(float(moments[-1]))
         if moments[0] < -slack or moments[2] > moments[0] + moments[1] + slack:
             raise InvalidFigures(
-                f"inertials.inertia.{k}", "belongs to no body: see its principal moments."
+                f"inertials.inertia.{k}",
+                "is impossible for a real body: check its principal moments.",
             )
 
 
@@ -315,9 +316,10 @@ def _uncertainty(document: dict[str, Any], figures: dict[str, Any], nq: int) -> 
         if not _is_parameter(name, figures, nq):
             raise InvalidFigures(
                 f"covariance.names.{k}",
-                "is no parameter of these figures: use paths like friction_laws.LAW.coulomb.0, "
-                f"drives.copper.2 or electronics.idle_power, of {', '.join((*FRICTION, *DRIVES))} "
-                f"and idle_power, or inertials.m.1 with one of {', '.join(LINKS)}.",
+                "is not a parameter of these figures: use paths like "
+                "friction_laws.LAW.coulomb.0, drives.copper.2 or electronics.idle_power, of "
+                f"{', '.join((*FRICTION, *DRIVES))} and idle_power, or inertials.m.1 with one of "
+                f"{', '.join(LINKS)}.",
             )
     matrix = numbers("covariance.matrix", given["matrix"], (len(names), len(names)))
     scale = float(np.abs(matrix).max())

@@ -29,7 +29,7 @@ def collada_corners(content: bytes, most: MeshSize, checkpoint: Checkpoint) -> A
     text = content.decode("utf-8-sig", errors="replace")
     root = xml_tree(text, checkpoint, LIMITS.collada_bytes)
     if root.tag != "COLLADA":
-        raise UnreadableFile("is no COLLADA file: export the mesh again.")
+        raise UnreadableFile("is not a COLLADA file: export the mesh again.")
     unit = root.find("asset/unit")
     metres = _floats(unit.get("meter", "1") if unit is not None else "1", 1)[0]
     document = _Document(root, most, checkpoint)
@@ -158,5 +158,5 @@ def _floats(text: str, count: int | None = None) -> Array:
     except ValueError:
         values = np.zeros(0)
     if count is not None and len(values) != count:
-        raise UnreadableFile(f"has {text[:40]!r} where {count} numbers belong.")
+        raise UnreadableFile(f"has {text[:40]!r} where {count} numbers are expected.")
     return values

@@ -35,7 +35,7 @@ def check_glb(content: bytes, most: MeshSize) -> None:
         copies = [primitives[node["mesh"]] for node in nodes if "mesh" in node]
         depth = _depth([node.get("children", []) for node in nodes])
     except (struct.error, ValueError, TypeError, LookupError, AttributeError, RecursionError):
-        raise UnreadableFile("is no glb file that can be read: export the mesh again.") from None
+        raise UnreadableFile("is not a readable glb file: export the mesh again.") from None
     most.check(0, sum(map(sum, copies)))
     entries = max(len(accessors), len(nodes), sum(map(len, primitives)), sum(map(len, copies)))
     if (
@@ -45,8 +45,9 @@ def check_glb(content: bytes, most: MeshSize) -> None:
         or depth > LIMITS.glb_depth
     ):
         raise UnreadableFile(
-            "is no plain glb file (accessors without data, repeated or deeply nested nodes, too "
-            "many entries): export the mesh alone, without compression, animation or materials."
+            "is not a plain glb file (accessors without data, repeated or deeply nested nodes, "
+            "too many entries): export the mesh alone, without compression, animation or "
+            "materials."
         )
 
 

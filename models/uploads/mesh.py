@@ -46,9 +46,7 @@ def read_mesh(
         corners = np.asarray(mesh.vertices, dtype=float).reshape(-1, 3)
         triangles = np.asarray(getattr(mesh, "faces", ()), dtype=np.int64).reshape(-1, 3)
     except Exception as error:  # trimesh raises many kinds for broken files
-        raise UnreadableFile(
-            f"is no {kind} file that can be read: export the mesh again."
-        ) from error
+        raise UnreadableFile(f"is not a readable {kind} file: export the mesh again.") from error
     most.check(len(corners), len(triangles))
     return corners, triangles
 
@@ -67,5 +65,5 @@ def _is_binary_stl(content: bytes, most: MeshSize) -> bool:
     if len(content) == length:
         most.check(3 * count, count)
     elif len(content) < length and b"solid" not in content[:1024].lower():
-        raise UnreadableFile("is no complete STL file: it is shorter than its header says.")
+        raise UnreadableFile("is an incomplete STL file: it is shorter than its header says.")
     return len(content) == length

@@ -60,7 +60,7 @@ def _index(word: bytes, corners: int) -> int:
     if index < 0:
         index += corners + 1
     if index < 1:
-        raise UnreadableFile("has a face with a corner that there is not.")
+        raise UnreadableFile("has a face with a missing corner.")
     return index
 
 

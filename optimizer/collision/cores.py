@@ -78,7 +78,7 @@ def core_of(shape: Shape) -> Core:
         case Mesh():
             return Core(shape.vertices, shape.radius)
         case Points() | Voxels() | TriangleMesh():
-            raise TypeError(f"{type(shape).__name__} is no convex shape")
+            raise TypeError(f"{type(shape).__name__} is not a convex shape")
         case _:
             assert_never(shape)
 

@@ -76,13 +76,13 @@ class CycleBaseline:
     there as well. `move_by_move`: at each stop the move that needs the least energy by itself, as
     successive calls of `POST /optimize` choose it. `controller_default`: to the nearest
     configuration each time, by the robot's own controller with its default speed and acceleration.
-    Where `time` changes the cycle: `same_factor`, every move slowed or sped up alike;
-    `fastest_then_wait`, the fastest cycle, in configurations of its own, and a wait. With a free
+    Where `time` changes the cycle: `same_factor`, every move slowed down or sped up by one factor;
+    `fastest_then_wait`, the fastest cycle, in its own configurations, and a wait. With a free
     order, where it is allowed: `given_order`, the best cycle in the order of `stops`. With an
-    energy storage on the bus: `without_storage`, the best cycle on the same bus without it, beside
-    `move_by_move` alone. In the configurations and times of the answer: `ruckig_slowed` and
-    `straight`, every move but lines and paths by the motion of this name of `POST /optimize`.
-    `waypoints` and `blended` alike, in their own times, if fewer than two others break none."""
+    energy storage on the bus, only `move_by_move` and `without_storage`, the best cycle on the same
+    bus without it. In the configurations and times of the answer: `ruckig_slowed` and `straight`,
+    every move but lines and paths by the motion of this name of `POST /optimize`. `waypoints` and
+    `blended` likewise, in their own times, if fewer than two others keep every limit."""
     duration: Seconds
     """Duration of this cycle."""
     electrical: Joules = field(init=False)
@@ -96,7 +96,7 @@ class CycleBaseline:
     saving: Ratio | None
     """1 - energy of the answer / energy of this cycle, of the objective, in the same cycle time:
     the shorter one also waits, where the answer waits for least, until the longer one ends. Null
-    where this cycle is not within the limits: it is no way to compare with."""
+    where this cycle is not within the limits."""
     saving_interval: SavingInterval | None
     """How well the saving is known. Null without a saving, and for the objective `mechanical`."""
     energies: Annotated[CycleEnergies, Internal] = field(repr=False)
@@ -133,7 +133,7 @@ class SolvedCycle:
     legs: Annotated[Sequence[LegReport], NotEmpty]
     """Moves and dwells in their order."""
     baselines: list[CycleBaseline]
-    """The same cycle in other ways, as far as they were found in time."""
+    """Other cycles over the same stops for comparison, as far as they were found in time."""
     certificate: CycleCertificate
     """Independent check of all moves."""
     search: CycleSearchReport

@@ -32,13 +32,12 @@ class NoSequence(JoulepathError):
     """Why some motion to the stop was not found; empty if that is not known."""
 
     def __str__(self) -> str:
-        cause = f" Why one was not found: {self.cause}." if self.cause else ""
+        cause = f" Cause: {self.cause}." if self.cause else ""
         return (
-            "The arm can be at every stop, but no cycle was found: from no configuration to which "
-            "the moves before "
-            f"lead was a motion within the limits found to {self.stop}. Move this stop or the one "
-            "before it, relax a "
-            f"limit, leave `branch` out or set `windings` true.{cause}"
+            "The arm can reach every stop, but no cycle was found: no motion within the limits "
+            f"leads to {self.stop} from the configurations that the moves before it reach. Move "
+            "this stop or the one before it, relax a limit, leave `branch` out or set "
+            f"`windings` true.{cause}"
         )
 
 

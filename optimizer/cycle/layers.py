@@ -125,8 +125,8 @@ def layer_of(
     if len(nodes) > LAYER.most_nodes:
         raise InvalidProblem(
             field,
-            f"{name} has {len(nodes)} arm configurations, of at most {LAYER.most_nodes}: give "
-            "fewer targets, a `branch`, or `windings` false.",
+            f"{name} has {len(nodes)} arm configurations, but at most {LAYER.most_nodes} are "
+            "possible: give fewer targets, a `branch`, or `windings` false.",
         )
     end = np.array([k for k, _ in nodes])
     positions = np.array([node for _, node in nodes])

@@ -97,9 +97,9 @@ class Leg:
         if len(start.q) * len(goal.q) > LEG.most_pairs:
             raise InvalidProblem(
                 "stops",
-                f"From {start.name} to {goal.name} there are {len(start.q) * len(goal.q)} pairs of "
-                f"arm configurations, of at most {LEG.most_pairs}: give fewer targets, a `branch`, "
-                "or `windings` false.",
+                f"From {start.name} to {goal.name} there are {len(start.q) * len(goal.q)} pairs "
+                f"of arm configurations, but at most {LEG.most_pairs} are possible: give fewer "
+                "targets, a `branch`, or `windings` false.",
             )
         return cls._of_kinds(prepared, start, goal, *kinds_of(start, goal, prepared), dwell)
 
@@ -114,9 +114,9 @@ class Leg:
         if len(start.q) > LEG.most_path_nodes:
             raise InvalidProblem(
                 "stops",
-                f"{goal.name} has {len(start.q)} arm configurations, of at most "
-                f"{LEG.most_path_nodes} with a line or a path: give fewer targets, a `branch`, or "
-                "`windings` false.",
+                f"{goal.name} has {len(start.q)} arm configurations, but at most "
+                f"{LEG.most_path_nodes} are possible with a line or a path: give fewer targets, "
+                "a `branch`, or `windings` false.",
             )
         _, first, number = np.unique(start.end, return_index=True, return_inverse=True)
         kind = np.full((len(start.q), len(goal.q)), -1)
@@ -268,9 +268,9 @@ def check_size(moves: Sequence[PlannedMove], layers: Mapping[str, Layer]) -> Non
     if sum(pairs) > LEG.most_pairs_of_cycle:
         raise InvalidProblem(
             "stops",
-            f"The moves of this cycle have {sum(pairs)} pairs of arm configurations, of at most "
-            f"{LEG.most_pairs_of_cycle}: give fewer stops or targets, a `branch`, or `windings` "
-            "false.",
+            f"The moves of this cycle have {sum(pairs)} pairs of arm configurations, but at most "
+            f"{LEG.most_pairs_of_cycle} are possible: give fewer stops or targets, a `branch`, "
+            "or `windings` false.",
         )
 
 

@@ -183,7 +183,9 @@ class _Loader:
             compile_kernel(self._robot)
         except (RuntimeError, OSError) as error:
             log.warning(
-                "kernel of %s not compiled, the virtual machine serves: %s", self._robot.name, error
+                "the kernel of %s was not compiled, so CasADi interprets it: %s",
+                self._robot.name,
+                error,
             )
 
 

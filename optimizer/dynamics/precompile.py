@@ -28,9 +28,7 @@ if __name__ == "__main__":
             print(compile_kernel(load_robot(name), portable))
     except (RuntimeError, OSError) as error:
         sys.exit(
-            f"The kernels cannot be compiled: {error}\nName a C compiler that works by CC, or a "
-            "folder for the "
-            "kernels by JOULEPATH_CACHE_DIR. The service also works without them (`make serve "
-            "JOULEPATH_ROBOTS=`), "
-            "more slowly."
+            f"The kernels cannot be compiled: {error}\nSet CC to a C compiler that works, or "
+            "JOULEPATH_CACHE_DIR to a folder for the kernels. The service also works without "
+            "them (`make serve JOULEPATH_ROBOTS=`), more slowly."
         )

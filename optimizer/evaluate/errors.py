@@ -13,7 +13,7 @@ from joulepath.optimizer.exceptions import JoulepathError
 @dataclass(eq=False)
 class NotCertified(JoulepathError):
     """The motion to be exported failed its certificate, which is computed again: it exceeds a limit
-    of the arm, touches something, does not stand still at its ends, or its samples do not belong to
+    of the arm, collides, is not at rest at its ends, or its samples do not belong to
     its spline on this arm.
     """
 

@@ -174,9 +174,7 @@ class Recording:
         """
         columns = [None if each is None else np.asarray(each, dtype=float) for each in (t, q, v, a)]
         if len({len(each) for each in columns if each is not None}) > 1:
-            raise InvalidProblem(
-                "trajectory", "t, q, v and a must have as many rows as each other."
-            )
+            raise InvalidProblem("trajectory", "t, q, v and a must have the same number of rows.")
         rows = [
             slice(low, high)
             for low, high in pairwise([*range(0, len(t), MOTION_LIMITS.block_rows), len(t)])
@@ -234,9 +232,7 @@ class Recording:
             yield RecordedRows(t, block.q, block.v, block.a)
             row, last = row + len(t), float(t[-1])
         if row - self.first_row < 2:
-            raise InvalidTable(
-                "A trajectory needs two or more rows: there is no motion in fewer.", None, None
-            )
+            raise InvalidTable("A trajectory needs two or more rows.", None, None)
 
 
 def _check_finite(block: RecordedRows, first_row: int) -> None:
@@ -255,7 +251,7 @@ def _check_finite(block: RecordedRows, first_row: int) -> None:
             row, joint = wrong[0].tolist()
             column = name if name == "t" else f"{name}{joint + 1}"
             raise InvalidTable(
-                f"{column} at row {first_row + row} is not finite, or too large to be a robot's: "
+                f"{column} at row {first_row + row} is not finite, or too large for a robot: "
                 "correct it or drop the row.",
                 first_row + row,
                 column,

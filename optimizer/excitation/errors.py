@@ -13,9 +13,9 @@ class ExcitationInfeasible(JoulepathError):
 
     title = "No excitation within the limits"
     remedy = (
-        "For `clearance`, move obstacles, ask for less, or give a `centre` with more room; for "
-        "`position`, widen it, or give such a `centre` or a shorter `period`; else relax the limit "
-        "or give a longer `period`."
+        "For `clearance`, move obstacles, reduce the clearance, or give a `centre` with more "
+        "room; for `position`, widen the limit, or give such a `centre` or a shorter `period`; "
+        "otherwise relax the limit or give a longer `period`."
     )
 
     limit: str
@@ -23,12 +23,12 @@ class ExcitationInfeasible(JoulepathError):
     …"""
 
     def __str__(self) -> str:
-        remedy = "relax it, or give a longer period"
+        remedy = "relax this limit, or give a longer period"
         if self.limit == "clearance":
-            remedy = "move the obstacles, ask for less clearance, or give a centre with more room"
+            remedy = "move the obstacles, reduce the clearance, or give a centre with more room"
         elif self.limit == "position":
-            remedy = "widen it, give a centre with more room, or give a shorter period"
+            remedy = "widen this limit, give a centre with more room, or give a shorter period"
         return (
-            f"No excitation was found that keeps its limits, the last one broke {self.limit}: "
+            f"No excitation within the limits was found. The last one exceeded {self.limit}: "
             f"{remedy}."
         )

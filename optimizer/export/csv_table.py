@@ -26,10 +26,7 @@ def to_csv(program: Program, options: TableOptions | None = None) -> WrittenFile
     period = (options or TableOptions()).period
     t = times(program, period, "csv")
     text = csv_text(t, dict(zip("qva", program.at(t), strict=True)), "%.12g")
-    notes = (
-        f"Rows every {period:g} s, exact at each; between them it is for the reader to "
-        "interpolate.",
-    )
+    notes = (f"Rows every {period:g} s, exact at each row; the reader interpolates between them.",)
     return WrittenFile.of_text(text, "text/csv", "csv", notes)
 
 

@@ -76,12 +76,14 @@ FORMATS: dict[FormatName, Format] = {
         FrankaOptions,
     ),
     "rapid": Format(
-        "A module for ABB controllers, which hold the times only roughly; the file says how far.",
+        "A module for ABB controllers, which keep the times only roughly; the file states the "
+        "deviation.",
         to_rapid,
         RapidOptions,
     ),
     "krl": Format(
-        "A program for KUKA controllers, which hold the times only roughly; the file says how far.",
+        "A program for KUKA controllers, which keep the times only roughly; the file states the "
+        "deviation.",
         to_krl,
         KrlOptions,
     ),

@@ -9,8 +9,8 @@ from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.program import Program
 
 NOT_RUN = (
-    "Not run on hardware: run it in the simulator of the maker, then slowly, with a hand at "
-    "the stop button."
+    "Not tested on hardware: run the file in the simulator of the manufacturer, then slowly, "
+    "with a hand on the stop button."
 )
 _NOT_PLAIN = re.compile(r"[^A-Za-z0-9 .,:+\-/()=%_]")
 

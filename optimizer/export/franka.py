@@ -61,8 +61,8 @@ def to_franka(program: Program, options: FrankaOptions | None = None) -> Written
     if program.changes_payload:
         raise FormatUnsuitable(
             "franka",
-            "The payload changes on the way, and a motion generator cannot switch it: export move "
-            "by move.",
+            "The payload changes during the motion, and a motion generator cannot switch it: "
+            "export move by move.",
         )
     t = ticks(
         program,
@@ -73,7 +73,7 @@ def to_franka(program: Program, options: FrankaOptions | None = None) -> Written
     q, v, _ = program.at(t)
     notes = (
         f"a row every millisecond, exact to {FRANKA.rounding:.0e} rad, the last at the goal",
-        "set the payload with setLoad before, and move to the start with a motion of your own",
+        "set the payload with setLoad first, and move to the start with your own motion",
         "limits of the FR3 that depend on the joint positions are not checked",
     )
     if options.form == "csv":

@@ -34,6 +34,6 @@ def to_joint_limits(program: Program, options: LimitsOptions | None = None) -> W
         DeadlinePassed: the watched deadline passed.
     """
     found = joint_limits_along([(move.spline, move.arm) for move in program.moves])
-    notes = ("the limits hold on this path alone, at other speeds and accelerations, too",)
+    notes = ("the limits hold only on this path, also at other speeds and accelerations",)
     text = found.to_yaml((options or LimitsOptions()).prefix)
     return WrittenFile.of_text(text, "application/yaml", "yaml", notes)

@@ -52,9 +52,9 @@ def to_krl(program: Program, options: KrlOptions | None = None) -> WrittenFile:
     notes = (
         f"within {max(each.deviation for each in moves):.2e} rad of the spline, if the controller "
         "keeps every time",
-        "model of the controller: it passes the points at their times, and between them anything "
-        "from straight lines in joint space to the cubic spline",
-        "what it adds to a time that it cannot keep is not in this bound",
+        "assumed controller: it passes the points at their times, and follows any curve between "
+        "them from straight lines in joint space to the cubic spline",
+        "delays of a controller that cannot keep a time are not in this bound",
         *output_note(program, options.digital_output),
     )
     lines = ["&ACCESS RVP", "DEF joulepath( )"]

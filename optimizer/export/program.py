@@ -92,7 +92,7 @@ class Program:
         if max((float(jump.max()) for jump in jumps), default=0.0) > PROGRAM.max_jump:
             raise InvalidProblem(
                 "answer",
-                "A move does not begin where the one before it ends: ask for the cycle again.",
+                "A move does not begin where the previous one ends: compute the cycle again.",
             )
 
     @cached_property

@@ -122,7 +122,7 @@ def _points_of_move(spline: Spline, t0: float, format: str) -> tuple[Array, Arra
             break
     raise FormatUnsuitable(
         format,
-        "No points of this motion hold the tolerance between them: export it as json, csv or npz.",
+        "No number of points keeps the tolerance for this motion: export it as json, csv or npz.",
     )
 
 

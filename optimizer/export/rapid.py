@@ -62,9 +62,9 @@ def to_rapid(program: Program, options: RapidOptions | None = None) -> WrittenFi
     notes = (
         f"within {max(each.deviation for each in moves):.2e} rad of the spline, if the controller "
         "keeps every time",
-        "model of the controller: straight lines in joint space, each in its time, corners "
+        "assumed controller: straight lines in joint space, each in its time, with corners "
         "rounded by any amount up to the middles of the lines",
-        "what it adds to a time that it cannot keep is not in this bound",
+        "delays of a controller that cannot keep a time are not in this bound",
         *output_note(program, options.digital_output),
     )
     loads = _loads(program)

@@ -96,9 +96,9 @@ def to_urscript(program: Program, options: UrscriptOptions | None = None) -> Wri
     notes = (
         f"set points every {1000 / options.rate:g} ms by servoj, within "
         f"{URSCRIPT.set_point_error:.0e} rad of the spline",
-        f"the arm follows them later by about lookahead_time = {options.lookahead_time:g} s",
-        f"it stops if a joint is more than {tracking:.3f} rad away from its set point",
-        "at the end of a move it waits up to 1 s until every joint is within 0.001 rad",
+        f"the arm follows the set points about lookahead_time = {options.lookahead_time:g} s later",
+        f"the program stops if a joint is more than {tracking:.3f} rad away from its set point",
+        "at the end of a move, the program waits up to 1 s until every joint is within 0.001 rad",
         "while the controller scales the speed down, servoj takes longer, and so does the motion",
         *_output_notes(program, options),
     )
@@ -152,7 +152,7 @@ def _output_notes(program: Program, options: UrscriptOptions) -> tuple[str, ...]
         return output_note(program, output)
     return (
         f"standard digital output {output} is on from each grasp to the release",
-        "the gripper has as long as the dwell at the stop",
+        "the time for the gripper is the dwell at the stop",
     )
 
 
@@ -163,9 +163,9 @@ def _beginning(program: Program) -> list[str]:
         f"  # {comment(program.timed[0].step.label)}: the start, in joint space",
         f"  local jp_start = {start}",
         f"  if norm(get_target_payload() - {program.payload.mass:.6f}) > 0.05:",
-        f'    popup("The payload in force is not that of the motion, {program.payload.mass:.3f} '
-        'kg. Continue sets it."'
-        ', "joulepath", True, False, blocking=True)',
+        '    popup("The active payload differs from that of the motion, '
+        f'{program.payload.mass:.3f} kg. Continue sets it.", "joulepath", True, False, '
+        "blocking=True)",
         "  end",
         *_payload(program.payload),
         "  if jp_far(get_actual_joint_positions(), jp_start) > 0.01:",

@@ -42,8 +42,8 @@ _INERTIALS = {"mass": "kg", "center_of_mass": "m", "inertia": "kg·m²"}
 IDENTIFIED = "B"
 LINK_MASS = "inertials.m"
 UNDETERMINED = (
-    "The logs hardly determine {}: what they do not determine has its most probable value, given "
-    "the logs and the range of the robot's own."
+    "The logs hardly determine {}: undetermined values are the most probable ones, given the "
+    "logs and the range of the robot's own."
 )
 KEPT = "Of {}, the robot's own values of trust {} are kept: {}"
 

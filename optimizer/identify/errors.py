@@ -15,7 +15,7 @@ class LogTooLarge(JoulepathError):
 
     status = 413
     title = "Log too large"
-    remedy = "Send it in parts, at a lower rate, or only the columns that count."
+    remedy = "Send it in parts, at a lower rate, or only the columns that are needed."
 
     limit: Count
     """Most rows or bytes; `detail` says which."""
@@ -25,7 +25,7 @@ class LogTooLarge(JoulepathError):
     def __str__(self) -> str:
         return (
             f"The log has more than {self.limit} {self.unit}: send it in parts, at a lower rate, "
-            "or only the columns that count."
+            "or only the columns that are needed."
         )
 
 
@@ -64,9 +64,9 @@ class NotExcited(JoulepathError):
         "motor currents or the power of the arm's bus."
     )
     detail = (
-        "Nothing that was asked for can be identified from these logs: log motor currents, torques "
-        "or the power of the arm's bus, and motions in which every joint moves, at several speeds "
-        "and in both directions."
+        "None of the requested figures can be identified from these logs: log motor currents, "
+        "torques or the power of the arm's bus, and motions in which every joint moves, at "
+        "several speeds and in both directions."
     )
 
     parameters: list[str]
@@ -101,11 +101,11 @@ class NoPowerChannel(JoulepathError):
     title = "No power channel"
     remedy = (
         "Log `actual_robot_voltage` and `actual_robot_current`, or a column `P`. Joint currents "
-        "are not taken for it: they are no DC currents."
+        "do not replace it: they are not DC currents."
     )
     detail = (
-        "No log has the power of the arm's bus: log voltage and current of the arm, or its power. "
-        "Joint currents are not taken for it, as they are no DC currents."
+        "No log has the power of the arm's bus: log voltage and current of the arm, or its "
+        "power. Joint currents do not replace it, because they are not DC currents."
     )
 
 
@@ -114,7 +114,10 @@ class MethodNotApplicable(JoulepathError):
     """The logs do not meet a requirement of the `method`; `detail` names it."""
 
     title = "Method not applicable"
-    remedy = "Log it, or choose another method; `automatic` takes what the logs have."
+    remedy = (
+        "Log what the method needs, or choose another method; `automatic` uses what the logs "
+        "contain."
+    )
 
     method: str
     """The requested method."""
@@ -136,9 +139,9 @@ class PayloadUnknown(JoulepathError):
         'logs, by `"fit": ["payload"]` without `torque_constant`.'
     )
     detail = (
-        "Gravity does not tell the torque constants of all joints, and nobody said what the arm "
-        "carried: give `payload` with each log, of mass 0 if it was nothing, and find a payload "
-        "and torque constants one by one."
+        "Gravity does not determine the torque constants of all joints, because the payload is "
+        "unknown: give `payload` with each log, of mass 0 if there was none, and identify a "
+        "payload and torque constants separately."
     )
 
     joints: Annotated[list[int], Unit("1")]

@@ -229,7 +229,7 @@ def _identified(
     if len(options.mains) not in (0, len(logs)):
         given = len(options.mains)
         raise InvalidProblem(
-            "mains", f"mains needs one reading for each log: {len(logs)} in all, and not {given}."
+            "mains", f"mains needs one reading for each log: {len(logs)} in all, not {given}."
         )
     rows = _rows(robot, logs, options)
     check_logs(robot, rows, logs, options)
@@ -289,7 +289,7 @@ def _rows(robot: Robot, logs: Sequence[Log], options: IdentificationOptions) -> 
         return rows_of(robot, logs, options.needs_regressor, options.method == "base_wrench")
     if len(logs) < 2:
         raise InvalidProblem(
-            "logs", "A payload needs two logs: one without it, and last the one with it."
+            "logs", "A payload needs two logs: first one without the payload, last one with it."
         )
     return rows_of(robot, [*logs[:-1], replace(logs[-1], payload=Payload())], regressor=True)
 

@@ -88,7 +88,7 @@ class IdentificationOptions:
         if self.refit and self.links_unknown:
             raise InvalidProblem(
                 "inertials",
-                f"The method {self.method} finds the links by itself: keep the inertials.",
+                f"The method {self.method} identifies the links itself: keep the inertials.",
             )
         for name, unit, least, most, optional in (
             ("period", "seconds", 0.1, 1e4, True),

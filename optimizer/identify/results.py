@@ -162,7 +162,7 @@ class Validation:
     curves: Annotated[Curves, Internal]
     """The moves, as predicted by the fit without them."""
     energies: tuple[ComparedEnergy, ...] = ()
-    """Measured against predicted energy of each of these moves. Empty without a measurement, and in
+    """Measured and predicted energy of each of these moves. Empty without a measurement, and in
     answers stored by an earlier version."""
     cycles: tuple[ComparedEnergy, ...] = ()
     """The same for these moves of each cycle together. Empty also for logs that do not repeat."""

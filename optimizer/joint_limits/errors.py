@@ -27,7 +27,7 @@ class NoJointLimits(JoulepathError):
     def __str__(self) -> str:
         return (
             "No limits on speed and acceleration are proven for all postures. Joint "
-            f"{self.joint} has the least to spare: gravity takes up to {self.torque:.4g} of the "
-            f"{self.limit:.4g} N·m that friction leaves. Give a lighter payload, or an arm with "
-            "narrower joint ranges."
+            f"{self.joint} has the smallest reserve: gravity takes up to {self.torque:.4g} of "
+            f"the {self.limit:.4g} N·m that friction leaves. Give a lighter payload, or an arm "
+            "with narrower joint ranges."
         )

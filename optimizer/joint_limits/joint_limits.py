@@ -95,8 +95,8 @@ class JointLimits(ReadOnlyArrays):
             "No torque exceeds its limit. Proven for all speeds and accelerations within these "
             "limits at once, for",
             *(f"- {line}" for line in self.scope),
-            f"Of the torque left by gravity and friction, the proof has {self.spare:.0%} to spare. "
-            "Jerks are the robot's own limits.",
+            f"The proof has a reserve of {self.spare:.0%} of the torque left by gravity and "
+            "friction. Jerks are the robot's own limits.",
         )
         comment = "".join(f"# {line}\n" for line in head)
         return comment + yaml.safe_dump({"joint_limits": limits}, sort_keys=False)

@@ -25,8 +25,8 @@ class OrientationNotHeld(NoConfigurationFound):
 
     def __str__(self) -> str:
         return (
-            f"The arm has {self.joints} {'joint' if self.joints == 1 else 'joints'}, and was not "
-            f"found to hold the orientation of the {self.target} pose at its position: give "
-            '"orientation": "free" for the position alone, or with `free_about` for the position '
-            "and the direction of an axis, or give joint positions."
+            f"The arm has {self.joints} {'joint' if self.joints == 1 else 'joints'}, and no "
+            f"configuration with the orientation of the {self.target} pose was found: give "
+            '"orientation": "free" for the position alone, or with `free_about` for the '
+            "position and the direction of an axis, or give joint positions."
         )

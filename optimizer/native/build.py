@@ -81,8 +81,8 @@ def build(folder: Path = FOLDER) -> Path:
     except OSError as error:
         cause = error
     raise BuildFailed(
-        f"The C library of the optimizer cannot be compiled: {cause}\n"
-        "Name a C compiler that works by CC, or install one, such as `ziglang` from PyPI."
+        f"The C library of the optimizer cannot be compiled: {cause}\nSet CC to a C compiler "
+        "that works, or install one, such as `ziglang` from PyPI."
     )
 
 

@@ -38,7 +38,7 @@ _FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
 }
 _REMEDY = (
     f"`make ready` compiles it in a clone, and `python {FOLDER / 'build.py'}` wherever there is "
-    "a C compiler. Or install joulepath anew, from a wheel for this platform or the source archive."
+    "a C compiler. Or reinstall joulepath, from a wheel for this platform or the source archive."
 )
 
 
@@ -65,7 +65,7 @@ def load(path: Path) -> ctypes.CDLL:
     digest.restype = ctypes.c_char_p
     # A library of other sources would misread the arguments.
     if digest() != sources_digest().encode():
-        raise LibraryUnusable(path, "was compiled from other sources than the present ones")
+        raise LibraryUnusable(path, "was compiled from other sources than the current ones")
     for name, (arguments, result) in _FUNCTIONS.items():
         function = getattr(library, name)
         function.argtypes, function.restype = arguments, result

@@ -26,12 +26,12 @@ class ReasonCounts:
 
 @dataclass(eq=False)
 class NoPlacement(JoulepathError):
-    """The cycles can be run at no tried place of the region, not even at the nominal place."""
+    """The cycles are feasible at no tried place of the region, not even at the nominal place."""
 
     title = "No place found"
     remedy = (
-        "Widen the region, give a finer `resolution`, or see by `POST /cycle` what is wrong at the "
-        "nominal place."
+        "Widen the region, give a finer `resolution`, or use `POST /cycle` to find the cause at "
+        "the nominal place."
     )
 
     reasons: ReasonCounts
@@ -42,6 +42,6 @@ class NoPlacement(JoulepathError):
     def __str__(self) -> str:
         tried = sum(vars(self.reasons).values())
         return (
-            f"The cycles can be run at none of the {tried} places that were tried. At the nominal "
-            f"place: {self.nominal}"
+            f"The cycles are feasible at none of the {tried} places tried. At the nominal place: "
+            f"{self.nominal}"
         )

@@ -102,7 +102,7 @@ def _moved(
 ) -> Sequence[Moved]:
     if isinstance(moves, Group | str):
         if region is None:
-            raise InvalidProblem("region", "Say where the place may be: give a region.")
+            raise InvalidProblem("region", "The region of the place is missing: give a region.")
         return [Moved(region, moves)]
     if region is not None:
         raise InvalidProblem(

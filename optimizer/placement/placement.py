@@ -167,8 +167,8 @@ class Placement:
             if mounts and not self.is_upright:
                 raise InvalidProblem(
                     self.field(k, "region.mounts"),
-                    "Mounts are known where gravity points along the world's -z axis: turn the "
-                    "world, or leave region.mounts out.",
+                    "Mounts are defined only if gravity points along the world's -z axis: turn "
+                    "the world, or leave region.mounts out.",
                 )
 
     def _check_group(self, k: int, group: Group) -> None:

@@ -37,7 +37,7 @@ class FoundPlace:
     base: PlacedPose
     """Pose of the robot base in the world."""
     mount: Mount | None
-    """Mount of the base; null where its orientation is none of them."""
+    """Mount of the base; null for any other orientation."""
     offsets: list[PlacedPose]
     """Pose by which every group of `moves` is moved in the world, in their order; empty without
     groups."""
@@ -58,7 +58,7 @@ class MapPoint:
     base: PlacedPose
     """Pose of the robot base in the world."""
     mount: Mount | None
-    """Mount of the base; null where its orientation is none of them."""
+    """Mount of the base; null for any other orientation."""
     offsets: list[PlacedPose]
     """Pose by which every group of `moves` is moved in the world; empty without groups."""
     energy: Joules | None
@@ -102,8 +102,8 @@ class SolvedPlacement:
     nominal: FoundPlace | None
     """The nominal place; null if its cycles are infeasible, or were not found in time."""
     nominal_reason: Reason | None
-    """Why the nominal place has no cycles, as in `map`. Null if it has, and where there was no time
-    for them."""
+    """Why the nominal place has no cycles, as in `map`. Null if it has cycles, or if there was no
+    time for them."""
     saving: Ratio | None
     """1 - energy of the best place / energy of the nominal one; null without the latter."""
     lower_bound: Joules | None
@@ -111,10 +111,10 @@ class SolvedPlacement:
     configurations. Null where no bound is known."""
     optimality_gap: Ratio | None
     """Energy of the best place / lower_bound - 1: it is above the least possible by at most this
-    share. Null if the bound is not positive. For a six-joint arm of Universal Robots' form
-    or with a spherical wrist, and a cycle between poses or joint positions, the bound knows the
-    configurations at the stops for every place. In other cases it knows the lengths of the ways,
-    the payloads and the rests alone, and the gap is wide."""
+    share. Null if the bound is not positive. For a six-joint arm of Universal Robots' form or with
+    a spherical wrist, and a cycle between poses or joint positions, the bound includes the
+    configurations at the stops for every place. In other cases it includes only the lengths of the
+    paths, the payloads and the rests, and the gap is wide."""
     tolerance: list[Tolerance]
     """How precisely every free coordinate of the best place must be kept. Empty for listed places,
     and if there was no time to find it."""
@@ -123,8 +123,8 @@ class SolvedPlacement:
     map: list[MapPoint]
     """Places all over the region."""
     evaluated: Count
-    """Number of places at which the cycles were computed or estimated, those beside the map
-    included."""
+    """Number of places at which the cycles were computed or estimated, including those outside
+    the map."""
     left_out: Count
     """Number of places of the map for which there was no time."""
     wall_time: Seconds

@@ -109,8 +109,8 @@ class Space:
         if not axes and all(body.choices == 1 for body in bodies):
             raise InvalidProblem(
                 placement.field(0, "region"),
-                "The region has the nominal place alone: give a range of x, y, z or yaw, another "
-                "mount, or places.",
+                "The region contains only the nominal place: give a range of x, y, z or yaw, "
+                "another mount, or places.",
             )
         if placement.resolution is not None and not axes:
             raise InvalidProblem(
@@ -200,8 +200,8 @@ class Space:
         if self.placement.resolution is not None and size > MAP.most_points:
             raise InvalidProblem(
                 "resolution",
-                f"This resolution gives {size} places, of at most {MAP.most_points}: give a "
-                "coarser one, or a smaller region.",
+                f"This resolution gives {size} places, but at most {MAP.most_points} are "
+                "possible: give a coarser one, or a smaller region.",
             )
         values = [axis.values(count) for axis, count in zip(self.axes, self._counts, strict=True)]
         return [

@@ -56,7 +56,7 @@ class Saved:
             found = read(cls, json.loads(Path(path).read_text(encoding="utf-8")))
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise ValueError(
-                f"{path} is no {cls.__name__} that this version of joulepath saved: {error}"
+                f"{path} is not a {cls.__name__} saved by this version of joulepath: {error}"
             ) from error
         assert isinstance(found, cls)
         return found
@@ -131,7 +131,7 @@ def _dataclass(hint: Any, data: dict[str, Any]) -> Any:
     name = data.pop(CLASS)
     kind: Any = next((each for each in _with_subclasses(hint) if each.__name__ == name), None)
     if kind is None:
-        raise ValueError(f"a {name} stands where a {hint.__name__} belongs")
+        raise ValueError(f"a {name} is in the place of a {hint.__name__}")
     hints = hints_of(kind)
     return kind(**{field: read(hints[field], each) for field, each in data.items()})
 

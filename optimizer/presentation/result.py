@@ -89,8 +89,8 @@ class Result(Comparable, Saved):
         charts = self._charts()
         if not charts:
             raise ValueError(
-                f"{self!r} has no curves to draw. An evaluation has them with a `sample_period`; "
-                "other results without curves are tables: see `to_frame`."
+                f"{self!r} has no curves to draw. An evaluation has curves with a "
+                "`sample_period`; other results without curves are tables: see `to_frame`."
             )
         return plotted(charts, self._headline())
 

@@ -84,9 +84,8 @@ class Payload:
         if principal[0] < -slack or principal[2] > principal[0] + principal[1] + slack:
             raise InvalidProblem(
                 "payload.inertia",
-                "payload.inertia belongs to no body: its principal moments must not be negative, "
-                "and none may exceed "
-                "the sum of the other two.",
+                "payload.inertia is impossible for a real body: its principal moments must not "
+                "be negative, and none may exceed the sum of the other two.",
             )
 
     def is_same_body(self, other: Payload) -> bool:
@@ -288,9 +287,7 @@ class Arm:
             # bounds divide by the others; without a limit on jerk, acceleration jumps
             finite = name == "j_max" or (value < np.inf).all()
             if value.shape != most.shape or not ((value > 0).all() and finite):
-                message = (
-                    f"limits.{public} must be a positive number for every joint, and a finite one."
-                )
+                message = f"limits.{public} must be a positive, finite number for every joint."
                 raise InvalidProblem(f"limits.{public}", message)
             # the factor allows the robot's own limits after rounding
             if (value > most * (1 + 1e-9)).any():

@@ -136,7 +136,7 @@ class Cycle:
             for name in ("approach", "retreat", "path"):
                 if getattr(stop, name) is not None:
                     check_uncoupled(
-                        self.arm.robot, f"stops.{k}.{name}", "Tool paths are not followed"
+                        self.arm.robot, f"stops.{k}.{name}", "Tool paths are not supported"
                     )
             if stop.path is not None:
                 self._check_path(k, stop, stop.path)
@@ -170,10 +170,9 @@ class Cycle:
         if repeated is not None:
             raise InvalidProblem(
                 f"stops.{places[repeated][0]}.name",
-                f"Give each stop a name of its own. {START!r} is the start's, a stop's name with "
-                f"{APPROACH} or "
-                f"{RETREAT} is that of the outer end of its line, and with {ENTRY} that of the "
-                "start of its path.",
+                f"Give each stop its own name. {START!r} is reserved for the start, a stop's "
+                f"name with {APPROACH} or {RETREAT} for the outer end of its line, and with "
+                f"{ENTRY} for the start of its path.",
             )
 
     def _check_path(self, k: int, stop: Stop, path: StopPath) -> None:

@@ -24,7 +24,7 @@ _REMEDIES = {
     "Solution": ": give the answer of optimize(problem)",
     "Recording": ": give a solution, Recording.of(t, q), or Waypoints(q, times)",
     "Arm": ": give Arm(robot=load_robot(name))",
-    "Pose": ": give the pose of the TCP, as by Pose.from_pendant",
+    "Pose": ": give the pose of the TCP, for example by Pose.from_pendant",
     "Log": ": give read_log(file, robot).log",
     "Robot": ": give load_robot(name)",
     "Attachment": ": give load_tool(name).shape",

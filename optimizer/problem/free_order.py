@@ -90,10 +90,9 @@ def check_order(order: FreeOrder, stops: Sequence[Stop], carried: Payload) -> No
         if after and not after[-1].is_same_body(carried):
             raise InvalidProblem(
                 "together",
-                f"After {group[-1].name} the arm carries something else than at the start. With a "
-                "free order, name the "
-                "stops between which a part is carried together: the one where it is taken up "
-                "first.",
+                f"After {group[-1].name}, the payload differs from that at the start. With a "
+                "free order, list the stops between which a part is carried in `together`, the "
+                "one that picks it up first.",
             )
 
 

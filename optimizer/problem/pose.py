@@ -123,9 +123,7 @@ class Pose:
         position = _part(pose, "position", _part(pose, "translation"))
         orientation = _part(pose, "orientation", _part(pose, "rotation"))
         if position is None or orientation is None:
-            raise InvalidProblem(
-                "pose", "A pose of ROS has a position and an orientation: this one has not."
-            )
+            raise InvalidProblem("pose", "A ROS pose must have a position and an orientation.")
         return cls.from_quaternion(
             [_part(position, name) for name in "xyz"],
             [_part(orientation, name) for name in "xyzw"],

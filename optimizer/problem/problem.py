@@ -107,7 +107,7 @@ class Problem:
         ):
             raise InvalidProblem("duration", "duration.min must not exceed duration.max.")
         if self.tool_path is not None:
-            check_uncoupled(self.arm.robot, "tool_path", "Tool paths are not followed")
+            check_uncoupled(self.arm.robot, "tool_path", "Tool paths are not supported")
             for name in ("start", "goal"):
                 end = getattr(self, name)
                 if isinstance(end, AnyOf):

@@ -199,8 +199,7 @@ class Scene:
         if repeated is not None:
             raise InvalidProblem(
                 f"scene.obstacles.{repeated}.name",
-                "Two obstacles have the same name, but for case and spaces: give each another "
-                "name.",
+                "Two obstacles have the same name, apart from case and spaces: rename one of them.",
             )
 
     @property

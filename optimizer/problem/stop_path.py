@@ -64,8 +64,8 @@ class StopPath:
             if self.split:
                 raise InvalidProblem(
                     field,
-                    "A path that is to be divided has its orientation in full at both ends: leave "
-                    "out split.",
+                    "A path to be divided must have full orientations at both ends: leave out "
+                    "split.",
                 )
             try:
                 self.path.check_free(name, end)

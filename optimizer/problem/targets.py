@@ -92,8 +92,8 @@ def validated(arm: Arm, name: str, target: Target, free_start: bool = False) -> 
     ):
         raise InvalidProblem(
             name,
-            "Only a goal's orientation may be free, or a start's with a path: give the start's in "
-            "full.",
+            "Only the orientation of a goal, or of a start with a path, may be free: give the "
+            "full orientation of the start.",
         )
     if isinstance(target, AnyOf):
         nq = (arm.robot.nq,)
@@ -126,15 +126,15 @@ def validated_in_cycle(arm: Arm, field: str, target: Target) -> Target:
     if field == "start" and isinstance(target, ConeOrientedPose):
         raise InvalidProblem(
             field,
-            "The orientation at the start is given in full: give a quaternion, rpy or rotvec, or "
-            "joint positions.",
+            "The orientation at the start must be complete: give a quaternion, rpy or rotvec, "
+            "or joint positions.",
         )
     if isinstance(target, AnyOf) and any(
         isinstance(member, ConeOrientedPose) for member in target.targets
     ):
         raise InvalidProblem(
             field,
-            "Of several targets, each has its orientation in full: give a quaternion, rpy or "
+            "Each of several targets must have a full orientation: give a quaternion, rpy or "
             "rotvec.",
         )
     return validated(arm, field, target, free_start=True)

@@ -154,9 +154,9 @@ class ToolPath:
         if end.half_angle > 0 or along < 1 - TOOL_PATH.same_axis:
             raise InvalidProblem(
                 f"{name}.pose.orientation",
-                f"With a path, the {name}'s orientation may be free about the axis "
-                "path.tolerance.about alone: give "
-                "the same axis as free_about, or the orientation in full.",
+                f"With a path, the {name}'s orientation may be free only about the axis "
+                "path.tolerance.about: give the same axis as free_about, or the orientation in "
+                "full.",
             )
 
     def check_speed(self, most: float | None) -> None:
@@ -169,9 +169,8 @@ class ToolPath:
             if most is not None and most < self.fixed_speed * (1 + TOOL_PATH.speed_tolerance):
                 raise InvalidProblem(
                     "path.speed",
-                    f"On the path the TCP may be no faster than {most:.4g} m/s: give a fixed "
-                    "path.speed of at most "
-                    f"{most / (1 + TOOL_PATH.speed_tolerance):.4g} m/s.",
+                    f"On the path, the TCP can move at most at {most:.4g} m/s: give a fixed "
+                    f"path.speed of at most {most / (1 + TOOL_PATH.speed_tolerance):.4g} m/s.",
                 )
             return
         if (
@@ -181,7 +180,6 @@ class ToolPath:
         ):
             raise InvalidProblem(
                 "path.speed.min",
-                f"On the path the TCP may be no faster than {most:.4g} m/s: give a path.speed.min "
-                "of at most "
-                f"{most / TOOL_PATH.speed_range:.4g} m/s.",
+                f"On the path, the TCP can move at most at {most:.4g} m/s: give a path.speed.min "
+                f"of at most {most / TOOL_PATH.speed_range:.4g} m/s.",
             )

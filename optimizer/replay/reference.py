@@ -62,8 +62,8 @@ def reference(course: Course, duration: float, step: float) -> Reference:
     if count > TIME_GRID.max_steps:
         raise InvalidProblem(
             "step",
-            f"The motion takes {count} steps, of at most {TIME_GRID.max_steps}: give a step of at "
-            f"least {bounds_in_words.least(duration / TIME_GRID.max_steps)} s.",
+            f"The motion takes {count} steps, but at most {TIME_GRID.max_steps} are possible: "
+            f"give a step of at least {bounds_in_words.least(duration / TIME_GRID.max_steps)} s.",
         )
     t = np.linspace(0.0, duration, count + 1)
     q, v, a = course(t)

@@ -44,7 +44,7 @@ class Baseline:
     degree 5, in the duration of the answer. `ruckig`: time-optimal within the velocity,
     acceleration and jerk limits. `ruckig_slowed`: the same motion, uniformly slowed down to the
     duration of the answer. `straight`: the fastest motion within the same limits along the straight
-    line in joints, all joints in step, slowed down to the duration of the answer.
+    line in joint space, with all joints synchronised, slowed down to the duration of the answer.
     `controller_default`: the robot's own controller with its default speed
     and acceleration. `waypoints`: from waypoint to waypoint of a planned path without collisions,
     straight in joints, with a rest at each. `blended`: along the same path without a rest, its
@@ -62,9 +62,8 @@ class Baseline:
     within_limits: bool = field(init=False)
     """Whether this motion is within every limit; collisions are checked at sample points."""
     reason: str | None
-    """Limits that this motion breaks, and the two bodies closer than allowed, with the amount. Null
-    if it is within every limit.
-    """
+    """Limits that this motion exceeds, and the two bodies closer than allowed, with the amount.
+    Null if it is within every limit."""
     saving: Ratio | None
     """1 - energy of the answer / energy of this motion, of the objective, in the same cycle time:
     the shorter motion also waits at its goal, held by the motors, until the longer one ends. Null

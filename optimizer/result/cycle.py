@@ -72,7 +72,7 @@ class BrokenMove:
     goal: str
     """Name of the stop at which it ends."""
     reason: str
-    """The limits that it breaks, and the two bodies closer than allowed, with the amount."""
+    """The limits that it exceeds, and the two bodies closer than allowed, with the amount."""
 
 
 @dataclass(frozen=True, kw_only=True)

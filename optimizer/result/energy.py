@@ -58,8 +58,8 @@ class EnergyInterval:
     """Standard deviation."""
     shares: Annotated[dict[str, float], Unit("1")]
     """Share of the variance by its source; they add up to 1. A figure of the arm: the greatest
-    share is the one to measure. `session`: friction differs from day to day. `move`: what the
-    model cannot express of a motion."""
+    share is the one to measure. `session`: friction differs from day to day. `move`: effects
+    outside the model."""
 
 
 @dataclass(frozen=True)

@@ -47,9 +47,11 @@ class Reason(Enum):
     DEFERRED = "other samples of the target have smaller lower bounds"
     ENOUGH_SOLVED = "the method solves no more candidates"
     BOUND = "its lower bound is not below the best energy found"
-    FAMILY = "not solved: others that differ from it by full turns of the outer joints alone were"
-    ROUGHLY = "not solved: its rough motion promises no less energy than the best motion found"
-    INVALID_END = "the arm cannot be at one of its ends"
+    FAMILY = "not solved: candidates that differ only by full turns of the outer joints were solved"
+    ROUGHLY = (
+        "not solved: its preliminary motion promises no less energy than the best motion found"
+    )
+    INVALID_END = "a configuration at one of its ends is invalid"
     TOO_SLOW = "takes longer than allowed"
     METHOD = "as the method says"
     NOT_CONFIRMED = "the certificate did not confirm it"
@@ -201,9 +203,8 @@ def pairs(
             if len(result) + len(q_start) > MOST_PAIRS:
                 raise InvalidProblem(
                     "goal" if isinstance(prepared.problem.goal, AnyOf) else "start",
-                    f"These targets make more than {MOST_PAIRS} pairs of arm configurations: give "
-                    "fewer of them, a "
-                    "`branch`, or `windings` false.",
+                    f"These targets make more than {MOST_PAIRS} pairs of arm configurations: "
+                    "give fewer targets, a `branch`, or `windings` false.",
                 )
             new = [Candidate(start, goal, *both) for both in zip(q_start, q_goal, strict=True)]
             if new[0].sampled:

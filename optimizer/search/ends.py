@@ -229,5 +229,6 @@ def _branch_unreachable(name: str) -> UnreachablePose:
     return UnreachablePose(
         name,
         None,
-        f"The branch asked for does not reach the {name} pose: leave `branch` out to try them all.",
+        f"The requested branch does not reach the {name} pose: leave `branch` out to try all "
+        "branches.",
     )

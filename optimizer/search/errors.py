@@ -141,7 +141,7 @@ class PathInfeasible(JoulepathError):
 
     title = "Path infeasible"
     remedy = (
-        "Move it, widen `limits.position`, or ask `POST /cycle` to divide it: a stop's "
+        "Move the path, widen `limits.position`, or let `POST /cycle` divide it by a stop's "
         "`path` with `split`."
     )
 
@@ -165,25 +165,24 @@ class PathInfeasible(JoulepathError):
         best = self.attempts[0]
         way = "the path" if self.path == "path" else self.path
         remedy = (
-            "Move it, widen limits.position, or ask POST /cycle to divide it: a stop's path "
-            "with split."
+            "Move the path, widen limits.position, or let POST /cycle divide it by a stop's "
+            "path with split."
         )
         if self.is_line:
             remedy = "Move the stop, shorten the line, or widen limits.position."
         if self.in_parts:
             remedy = (
-                "Some place of it is out of reach in all of them, so that it cannot be "
+                "A part of the path is out of reach in all configurations, so it cannot be "
                 "divided: move it."
             )
         if self.joints < POSE_FREEDOMS and best.reason == "unreachable":
             remedy = (
-                "An arm of fewer than six joints keeps its orientation on few paths only: choose "
-                "one of them, or send positions alone to POST /ik/path."
+                "An arm with fewer than six joints keeps its orientation on few paths only: "
+                "choose such a path, or send only positions to POST /ik/path."
             )
         return (
-            f"The arm cannot follow {way} to its end from any configuration: {best.label} gets "
-            f"{best.followed:.1%} of "
-            f"the way and ends there ({best.reason}). {remedy}"
+            f"The arm cannot follow {way} to its end from any configuration: {best.label} "
+            f"follows {best.followed:.1%} of it and ends there ({best.reason}). {remedy}"
         )
 
 

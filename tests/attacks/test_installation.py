@@ -315,7 +315,7 @@ def test_a_busy_port_is_told_with_its_remedy(tmp_path: Path, host: str) -> None:
         done = run(("joulepath.app",), os.environ | settings, WARM_UP)
     assert done.returncode == 1
     assert b"Address already in use" in done.stderr
-    assert b"choose another port by --port" in done.stderr
+    assert b"choose another port with --port" in done.stderr
     # The service has begun nothing: no log, no database.
     assert len(done.stderr.splitlines()) == 1 and not list(tmp_path.iterdir())
 

@@ -29,8 +29,8 @@ from tests.refusals import refusal_of
         ('<capsule radius="0" length="0.3"/>', "<capsule>, whose `radius`"),
         ('<sphere radius="1e-9"/>', "<sphere>, whose `radius`"),
         ('<sphere radius="1e9"/>', "<sphere>, whose `radius`"),
-        ('<sphere radius="nan"/>', "`radius` that is no finite number"),
-        ('<sphere radius="inf"/>', "`radius` that is no finite number"),
+        ('<sphere radius="nan"/>', "`radius` that is not a finite number"),
+        ('<sphere radius="inf"/>', "`radius` that is not a finite number"),
         ('<box size="0.1 0 0.1"/>', "<box>, whose `size`"),
         ('<box size="0.1 -0.1 0.1"/>', "<box>, whose `size`"),
     ],
@@ -46,9 +46,9 @@ def test_a_shape_of_no_size_makes_no_robot(shape: str, words: str) -> None:
 @pytest.mark.parametrize(
     ("scale", "points", "words"),
     [
-        ('scale="0 0 0"', BLOCK, "press the mesh flat"),
-        ('scale="0.001 0.001 0"', BLOCK, "press the mesh flat"),
-        ('scale="0.001 0.001 1e-9"', BLOCK, "press the mesh flat"),
+        ('scale="0 0 0"', BLOCK, "flatten the mesh"),
+        ('scale="0.001 0.001 0"', BLOCK, "flatten the mesh"),
+        ('scale="0.001 0.001 1e-9"', BLOCK, "flatten the mesh"),
         ('scale="1e-9 1e-9 1e-9"', BLOCK, "extend over 0.0001 m"),
         ('scale="1e-308 1e-308 1e-308"', BLOCK, "extend over 0.0001 m"),
         ('scale="nan 1 1"', BLOCK, "finite numbers"),

@@ -208,7 +208,7 @@ def test_groups_materials_and_solids_cost_nothing(kind: Any, content: Callable[[
     ],
 )
 def test_a_glb_of_many_copies_is_refused(primitives: int, nodes: list[dict[str, Any]]) -> None:
-    with pytest.raises(InvalidProblem, match="no plain glb file"):
+    with pytest.raises(InvalidProblem, match="not a plain glb file"):
         mesh("glb", one_triangle(primitives, nodes))
 
 

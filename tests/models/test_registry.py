@@ -294,7 +294,7 @@ def test_the_sentence_on_energies_is_made_from_the_letters() -> None:
     for _, figure in leaves(figures):
         figure["trust"] = "E"
     assert energy_trust(figures).startswith(
-        "Energies rest on engineering defaults without a source (link masses"
+        "Energies are based on engineering defaults without a source (link masses"
     )
 
 

@@ -41,7 +41,9 @@ def answered(asked: AnsweredRequest, request_id: str, deadline: float) -> tuple[
     answer = kept_answers([asked.answer])[0]
     if not _fits(answer, task):
         raise InvalidProblem(
-            "answer", "This kept answer is of another request: leave `answer` out, or send both."
+            "answer",
+            "The stored answer belongs to another request: leave `answer` out, or "
+            "send that request.",
         )
     return answer, kept_answers(paths_of_moves(answer))
 

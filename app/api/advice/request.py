@@ -18,8 +18,8 @@ AdviceName = Literal["whole_cycle", "brakes", "without_home", "shorter_stops", "
 
 
 class AnsweredRequest(WithBodies):
-    """A motion or a cycle, as one of `optimize` and `cycle`, the id of its answer, and how often it
-    comes."""
+    """A motion or a cycle, as one of `optimize` and `cycle`, the id of its answer, and its
+    period."""
 
     optimize: OptimizeRequest | None = described(
         "A body of `POST /optimize`.", None, OPTIMIZE, default=None
@@ -31,15 +31,15 @@ class AnsweredRequest(WithBodies):
         default=None,
     )
     answer: Annotated[str, Field(max_length=LENGTHS.id)] | None = described(
-        "Id of the kept answer to the request. Null: the request is answered first.",
+        "Id of the stored answer to the request. Null: the request is answered first.",
         None,
         ANSWER_ID,
         default=None,
     )
 
     period: LongTime | None = described(
-        "Time from one start to the next. What is left of it after the motion or the cycle is "
-        "waited, unless the request has a `dwell` of its own. Null: one directly after the other.",
+        "Time from one start to the next. The arm waits for the rest of this time, unless the "
+        "request has its own `dwell`. Null: one directly after the other.",
         "s",
         6.0,
         default=None,
@@ -62,10 +62,10 @@ class AnsweredRequest(WithBodies):
 
 
 class AdviceRequest(AnsweredRequest):
-    """A motion or a cycle, as exactly one of `optimize` and `cycle`, and how often it comes."""
+    """A motion or a cycle, as exactly one of `optimize` and `cycle`, and its period."""
 
     changes: list[AdviceName] | None = described(
-        "Changes to be computed; with an empty list, only the wait is. Null: all.",
+        "Changes to compute; an empty list computes only the wait. Null: all changes.",
         None,
         ["brakes"],
         default=None,

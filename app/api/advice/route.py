@@ -18,12 +18,12 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
 @router.post(
     "/advice",
-    summary="Changes that need less energy",
+    summary="Changes that save energy",
     response_model=model_of(AdviceAnswer),
     responses=problem_responses(*dict.fromkeys((*MOTION_PROBLEMS, *CYCLE_PROBLEMS)), UnknownAnswer),
 )
 async def advice(body: AdviceRequest, tasks: ServiceTasks) -> Response:
     """Computes changes of a task: a motion over the whole cycle, brakes at rest, a cycle without
-    the way home, shorter stops, a lighter tool. Every change is optimised, and listed with its
-    energy if it saves energy. The service stores no answer."""
+    the moves from and to the start, shorter stops, a lighter tool. Every change is optimised, and
+    listed with its energy if it saves energy. The service stores no answer."""
     return await tasks.answer(AdviceTask(body, tasks.request_id))

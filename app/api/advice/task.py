@@ -40,8 +40,8 @@ class AdvisedChange:
     """A change of the task, and what the changed task needs."""
 
     name: AdviceName
-    """`whole_cycle`: the motion, or the cycle, has all of the `period` to itself. `brakes`: brakes
-    hold the arm at rest, 0.5 s after it stands. `without_home`: the cycle begins and ends at its
+    """`whole_cycle`: the motion, or the cycle, takes the whole `period`. `brakes`: brakes hold
+    the arm from 0.5 s after standstill. `without_home`: the cycle begins and ends at its
     last stop. `shorter_stops`: every dwell is 0.1 s shorter. `lighter_tool`: the tool has half of
     its mass."""
     energy: Joules

@@ -40,7 +40,7 @@ class KeptAnswer(Response):
 
 
 class AnswerSummary(KeptAnswer):
-    """A kept answer in a list. Its figures are null in answers of an earlier version."""
+    """A stored answer in a list. Its figures are null in answers of an earlier version."""
 
     robot: str | None = described("Name of the robot.", None, "ur5e")
     energy: float | None = described(
@@ -75,7 +75,7 @@ class StoredAnswer(KeptAnswer):
 
 
 class AnswerName(NewName):
-    """Another name of a kept answer, and how its request was typed."""
+    """Another name of a stored answer, and how its request was typed."""
 
     typed: dict[Pointer, TypedNumber] | None = described(
         "Texts in which the numbers of its request were typed, by JSON pointers, for pages that "
@@ -88,7 +88,7 @@ class AnswerName(NewName):
 
 
 class AnswerList(Response):
-    """Kept answers, newest first."""
+    """Stored answers, newest first."""
 
     answers: list[AnswerSummary] = part("The answers.")
     next: str | None = next_of(ANSWER_ID)

@@ -79,8 +79,8 @@ class StopRequest(Request):
         le=DURATIONS.longest,
     )
     payload: Payload | None = described(
-        "What the arm carries from here on, the dwell included; with a path, from its end on. "
-        "Null: nothing, it is put down. Left out: unchanged.",
+        "Payload from this stop on, dwell included; with a path, from its end on. Null: the "
+        "payload is put down. If left out, it is unchanged.",
         None,
         {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
         default=None,
@@ -114,8 +114,8 @@ class StopRequest(Request):
     )
     obstacles_ignored: Annotated[list[PlainName], Field(max_length=SCENE_RANGES.max_obstacles)] = (
         described(
-            "Names of obstacles that do not count at the stop, on its lines and its path, like the "
-            "part that is grasped.",
+            "Names of obstacles that are ignored at the stop, on its lines and its path, such "
+            "as the part to grasp.",
             None,
             ["part"],
             default=[],
@@ -192,9 +192,9 @@ class CycleRequest(ArmRequest):
         )
     )
     order: Literal["given", "free"] = described(
-        "`given`: the stops are visited in the order of `stops`. `free`: in the order that needs "
-        f"the least energy, for at most {MOST_FREE_STOPS} stops. The arm then carries the same "
-        "between groups of stops as at the start.",
+        "`given`: the stops are visited in the order of `stops`. `free`: in the order that "
+        f"needs the least energy, for at most {MOST_FREE_STOPS} stops. The payload between "
+        "groups of stops must then be that at the start.",
         None,
         "given",
         default="given",
@@ -211,8 +211,8 @@ class CycleRequest(ArmRequest):
         list[Annotated[list[PlainName], Field(min_length=2, max_length=MOST_FREE_STOPS)]],
         Field(max_length=MOST_FREE_STOPS),
     ] = described(
-        "With a free order: lists of stops that are visited one directly after the other, as they "
-        "are listed, like the one where a part is taken up and the one where it is put down.",
+        "With a free order: lists of stops that are visited directly one after another, in the "
+        "listed order, such as the stops where a part is picked up and put down.",
         None,
         [["pick", "place"]],
         default=[],
@@ -225,17 +225,17 @@ class CycleRequest(ArmRequest):
         default=True,
     )
     time: CycleTime | None = described(
-        "Duration of the cycle, dwells and waiting included, or bounds on it. Time is shared among "
-        "the moves so that the energy is least; what is left over is waited out where that costs "
-        "least. Null: the optimiser chooses.",
+        "Duration of the cycle, dwells and waiting included, or bounds on it. The time is "
+        "divided among the moves for the least energy; the arm waits for the rest where this "
+        "needs the least energy. Null: the optimiser chooses.",
         "s",
         12.0,
         default=None,
     )
     objective: Objective = described(
-        "`electrical`: the energy drawn by the whole cycle. `mechanical`: the work of its moves, ∫ "
-        "Σ |tau_j v_j| dt; rests need none, and slower moves less, so it needs a `time` or a "
-        "`time.max`.",
+        "`electrical`: the energy drawn by the whole cycle. `mechanical`: the work of its "
+        "moves, ∫ Σ |tau_j v_j| dt; slower moves need less work, so a `time` or a `time.max` is "
+        "required.",
         None,
         "electrical",
         default="electrical",
@@ -247,8 +247,8 @@ class CycleRequest(ArmRequest):
         default=Holding(),
     )
     wait: PlainName | None = described(
-        "Where time that is left over is waited out: `start`, or the name of a stop. Null: where "
-        "that costs least.",
+        "Where the arm waits for remaining time: `start`, or the name of a stop. Null: where "
+        "this needs the least energy.",
         None,
         "start",
         default=None,
@@ -263,8 +263,9 @@ class CycleRequest(ArmRequest):
         "How the moves are parametrised: see `POST /optimize`.", None, "bspline", default="bspline"
     )
     windings: bool = described(
-        "Whether full-turn alternatives q + 2πk within the joint range count at every stop. If "
-        "not, each configuration has the joint positions nearest to the middle of the joint range.",
+        "Whether full-turn alternatives q + 2πk within the joint range are used at every stop. "
+        "If not, each configuration has the joint positions nearest to the middle of the joint "
+        "range.",
         None,
         True,
         default=True,

@@ -51,7 +51,7 @@ class CycleAnswer(SolvedCycle, Answer):
     """Remarks on the cycle and on its moves, as in `POST /optimize`, with the ends of the move.
     Empty if there are none."""
     answer: str | None = None
-    """Path of this answer: `GET` returns it again. Null if it could not be kept."""
+    """Path of this answer: `GET` returns it again. Null if it could not be stored."""
 
     @classmethod
     def of(

@@ -93,7 +93,8 @@ def _check_header(columns: list[str], nq: int) -> None:
         )
     if not any(_COLUMN.fullmatch(name) for name in columns):
         raise InvalidTable(
-            f"The first line is no header: begin the file with the names of the columns, {wanted}",
+            "The first line is not a header: begin the file with the names of the columns, "
+            f"{wanted}",
             1,
         )
     expected = q if columns[0] in q else ["t", *q, *v, *a]

@@ -21,7 +21,7 @@ _CSV = "t,q1,…,q6,v1,…,v6,a1,…,a6\n0.0,0.0,-1.57,…\n0.008,0.0001,-1.5699
 
 @router.post(
     "/excitation",
-    summary="A motion that tells an arm's parameters apart",
+    summary="A motion that excites an arm's parameters",
     response_model=model_of(ExcitationAnswer),
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": _CSV}}},

@@ -41,9 +41,9 @@ class ExcitationRequest(ArmRequest):
     """A periodic, collision-free motion for the identification of an arm."""
 
     parameters: Annotated[list[Part], Field(min_length=1, max_length=3)] = described(
-        "Parameters that the motion is to tell apart: `inertials` (base parameters of the links), "
-        "`rotor` (rotor inertias), `friction` (Coulomb, viscous, offset, and load where a joint "
-        "carries enough).",
+        "Parameters to be identified from the motion: `inertials` (base parameters of the "
+        "links), `rotor` (rotor inertias), `friction` (Coulomb, viscous, offset, and load where "
+        "a joint carries enough).",
         None,
         ["rotor", "friction"],
         default=_ALL,
@@ -69,7 +69,7 @@ class ExcitationRequest(ArmRequest):
         le=0.5,
     )
     mounting_plane: bool = described(
-        "Whether the arm stands on an obstacle that fills everything below z = 0 of its base.",
+        "Whether the arm is mounted on an obstacle that fills everything below z = 0 of its base.",
         None,
         True,
         default=True,
@@ -86,9 +86,7 @@ class ExcitationRequest(ArmRequest):
         [1.5, 1.5, 1.5, 0.3, 0.3, 0.3],
         default=None,
     )
-    starts: int = described(
-        "Random starts that are tried at most.", "1", 3, default=3, ge=1, le=100
-    )
+    starts: int = described("Largest number of random starts.", "1", 3, default=3, ge=1, le=100)
     sample_period: float = described(
         "Time between the returned samples; at most 20,000.",
         "s",

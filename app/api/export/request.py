@@ -55,7 +55,7 @@ class UrscriptOptions(Request):
         default="polynomials",
     )
     lookahead_time: float = described(
-        "servoj's `lookahead_time`: larger is smoother and later.",
+        "`lookahead_time` of servoj: a larger value is smoother, but delays the arm more.",
         "s",
         0.05,
         default=0.1,
@@ -128,16 +128,16 @@ class PointsOptions(Request):
     """Options of both `rapid` and `krl`."""
 
     tolerance: float = described(
-        "Deviation from the spline that the number of points is chosen for. The file says what is "
-        "reached.",
+        "Deviation from the spline for which the number of points is chosen. The file states "
+        "the deviation reached.",
         "rad",
         0.002,
         default=0.005,
         **between(OPTION_RANGES.tolerance),
     )
     signs: Annotated[list[Literal[1, -1]], Field(min_length=1, max_length=16)] | None = described(
-        "Sense of the controller's axes against the joints of the robot's model, one per joint. "
-        "Null: the same.",
+        "Sign of the controller's axes relative to the joints of the robot's model, one per "
+        "joint. Null: equal.",
         None,
         [1, -1, 1, 1, 1, 1],
         default=None,

@@ -42,7 +42,7 @@ _HEADERS = {
     "Content-Disposition": "`attachment`, with a name for the file.",
     "Joulepath-Speed-Scale": "Fraction of the speed: `speed_scale` of the request.",
     "Joulepath-Worst-Ratio": "Largest value / limit of the exported motion, by its certificate, "
-    "computed anew.",
+    "computed again.",
     "Joulepath-Notes": "Sentences on the file, separated by `; `: how far it deviates, and what it "
     "leaves out.",
 }

@@ -56,14 +56,14 @@ class FiguresDetail(FiguresSummary):
         "Covariance of the identified parameters; null: none was identified."
     )
     session_sd: float | list[float] | None = described(
-        "Relative standard deviation of friction from one day to another, of all joints together "
-        "or of each joint by itself; null: not known.",
+        "Relative standard deviation of friction from one day to another, common to all joints, "
+        "or one per joint; null: not known.",
         "1",
         0.03,
     )
     move_sd: float | None = described(
-        "Standard deviation of what the model cannot express of a motion, as a mean power; null: "
-        "not known.",
+        "Standard deviation of the effects outside the model, as a mean power of a motion; "
+        "null: not known.",
         "W",
         1.5,
     )

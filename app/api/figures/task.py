@@ -67,14 +67,14 @@ class FiguresDocument(Request):
         default=None,
     )
     session_sd: _Share | Annotated[list[_Share], Field(max_length=16)] | None = described(
-        "Relative standard deviation of friction from one day to another, of all joints together "
-        "or of each joint by itself.",
+        "Relative standard deviation of friction from one day to another, common to all joints, "
+        "or one per joint.",
         "1",
         0.03,
         default=None,
     )
     move_sd: Annotated[float, Field(ge=0, le=1e5)] | None = described(
-        "Standard deviation of what the model cannot express of a motion, as a mean power.",
+        "Standard deviation of the effects outside the model, as a mean power of a motion.",
         "W",
         1.5,
         default=None,

@@ -72,7 +72,7 @@ class IdentificationResult:
     structure: Structure
     """Base parameters of the links and rotors."""
     physical: Physical | None
-    """Whether refitted links are real bodies; null without a refit."""
+    """Whether refitted links are physically possible; null without a refit."""
     validation: Validation | None
     """Errors on moves outside the fit; null for logs at rest, which identify the idle power."""
     residuals: Residuals
@@ -90,8 +90,8 @@ class IdentificationResult:
     """Payload of the last log; null if it was not requested."""
     measure: tuple[Advice, ...] = ()
     """What to measure next, in the order of its share in the interval of an energy: `advice` is the
-    first. Each share is that beside the figures before it. Empty in answers stored by an earlier
-    version."""
+    first. Each share assumes that the previous figures are known. Empty in answers stored by an
+    earlier version."""
 
     @classmethod
     def of(

@@ -89,8 +89,8 @@ class TorqueCurves(Response):
         [[12.4, 12.6], [-3.1, -3.0]],
     )
     modelled: list[list[float | None]] = described(
-        "By the figures; null where the joint is slower than `velocity_threshold`: friction at "
-        "rest is not known.",
+        "According to the figures; null where the joint is slower than `velocity_threshold`, "
+        "because friction at rest is not known.",
         "N·m",
         [[12.3, 12.7], [None, -3.1]],
     )
@@ -110,8 +110,8 @@ class ResidualMove(Response):
 
     log: str = described("Id of the log.", None, LOG_ID)
     held_out: bool = described(
-        "Whether the fit that predicts it has not seen it. All others are predicted by the figures "
-        "that were found.",
+        "Whether it was held out from the fit that predicts it. All other moves are predicted "
+        "with the identified figures.",
         None,
         True,
     )

@@ -55,26 +55,27 @@ class IdentifyRequest(Request):
 
     logs: LogIds = described("Ids of logs, all of one robot.", None, [LOG_ID])
     validate_: LogIds | Fraction | Literal["moves"] = described(
-        "What the figures are validated on, which no fit sees: other logs, a fraction of the "
-        "moves, or `moves`: each motion in its turn. Moves along the same motion stay together.",
+        "Held-out data on which the figures are validated: other logs, a fraction of the moves, "
+        "or `moves`, each motion in turn. Moves along the same motion stay together.",
         None,
         {"fraction": 0.3},
         default=Fraction(),
         alias="validate",
     )
     fit: Annotated[list[Target], Field(min_length=1, max_length=5)] = described(
-        "What is found. Power is added by itself where the logs have it; asking for it refuses "
-        "logs without. `torque_constant` is added by itself where the logs have currents and a "
-        "known payload, and the links are kept. `payload`: mass and centre of mass of what the "
-        "last of `logs` carried and the others did not; friction and rotors are found with it.",
+        "What is identified. Power is added automatically if the logs have it; if it is "
+        "requested, logs without it are refused. `torque_constant` is added automatically if "
+        "the logs have currents and a known payload, and the links are kept. `payload`: mass "
+        "and centre of mass of what the arm carried only in the last of `logs`; friction and "
+        "rotors are identified with it.",
         None,
         ["friction", "rotor"],
         default=["friction", "rotor"],
     )
     method: Method = described(
-        "How it is found. `automatic`: friction and rotors with the robot's own links where the "
-        "logs have currents or torques, and power where they have it. The others are methods of "
-        "the literature, each for its own kind of log: one that does not fit is "
+        "Method. `automatic`: friction and rotors with the robot's own links where the logs "
+        "have currents or torques, and power where they have it. The others are methods of the "
+        "literature, each for its own kind of log: one that does not fit is "
         "`method-not-applicable`.",
         None,
         "automatic",
@@ -107,7 +108,7 @@ class IdentifyRequest(Request):
         default="wls",
     )
     velocity_threshold: float = described(
-        "Slower samples of a joint do not count for its friction.",
+        "Slower samples of a joint are not used for its friction.",
         "rad/s",
         0.02,
         default=0.02,

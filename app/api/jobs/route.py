@@ -55,8 +55,8 @@ LastEventId = Annotated[
     str | None,
     Header(
         alias="Last-Event-ID",
-        description="Number of the last event that was received. A text that is no number has no "
-        "effect.",
+        description="Number of the last event that was received. A text that is not a number "
+        "has no effect.",
         examples=["17"],
     ),
 ]

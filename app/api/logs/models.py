@@ -100,7 +100,7 @@ class LogDetail(LogSummary):
         "Doubtful properties: gaps, constant or saturated channels, velocities that contradict the "
         "positions, an unknown payload, …",
         None,
-        ["No payload is given or logged: the arm is taken to have carried nothing."],
+        ["No payload is given or logged: the payload is assumed to be zero."],
     )
 
 

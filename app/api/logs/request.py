@@ -25,8 +25,7 @@ class LogSettings(LogFile):
         "Tags of your own.", None, ["cold"], default=[]
     )
     payload: Payload | None = described(
-        "What the arm carried. Null: what the log says (`payload`, `payload_cog_0` …), else "
-        "nothing.",
+        "Payload of the arm. Null: that in the log (`payload`, `payload_cog_0` …), otherwise none.",
         None,
         {"mass": 2.0, "com": [0.0, 0.0, 0.06]},
         default=None,

@@ -46,9 +46,9 @@ class OptimizeAnswer(SolvedMotion, MotionAnswer):
     configurations may have been missed, that a baseline is left out, what a tool or payload
     without a shape would touch, or which figures of the request are likely in another unit."""
     answer: str | None = None
-    """Path under which this answer is kept: `GET` returns it again. Null if it is not kept: the
-    database cannot be written, the answer is larger than all that the service may keep, or it is a
-    part of another answer."""
+    """Path of this stored answer: `GET` returns it again. Null if it is not stored: the database
+    cannot be written, the answer is larger than the service may store, or it is a part of another
+    answer."""
 
     @classmethod
     def of(

@@ -61,7 +61,7 @@ class Places(Request):
     places: Annotated[list[Pose], Field(min_length=1, max_length=REGION_RANGES.max_places)] = (
         described(
             "Poses of the base in the world, or offsets of a group from the given poses. The "
-            "nominal place is one more.",
+            "nominal place is added.",
             None,
             [at(0.0, 0.0, 0.0), at(0.2, 0.0, 0.0)],
         )
@@ -168,8 +168,8 @@ class PlacementRequest(WithBodies):
         default=IDENTITY,
     )
     region: RegionOrPlaces | None = described(
-        "Where the base may be in the world, or how far the group may move. The nominal place is "
-        "in it. Null: `moves` is a list.",
+        "Where the base may be in the world, or how far the group may move. It must contain the "
+        "nominal place. Null: `moves` is a list.",
         None,
         _REGION,
         default=None,

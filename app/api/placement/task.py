@@ -58,7 +58,7 @@ class PlacementAnswer(SolvedPlacement, Answer):
     warnings: list[str]
     """Remarks on the placement. Empty if there are none."""
     answer: str | None = None
-    """Path of this answer: `GET` returns it again. Null if it could not be kept."""
+    """Path of this answer: `GET` returns it again. Null if it could not be stored."""
 
     @property
     def figures(self) -> AnswerFigures:

@@ -33,10 +33,11 @@ from joulepath.optimizer.replay.simulator import mujoco
 from joulepath.optimizer.result.baseline import BaselineName
 from joulepath.optimizer.result.energy import Objective
 
-PERTURBED_NOTHING = "The arm carries no payload: to change it has no effect."
+PERTURBED_NOTHING = "The arm carries no payload: changing it has no effect."
 NO_BASELINES = (
-    "The motions of the baselines do not follow from this answer, so that their savings are not "
-    "replayed. They do for goals that are joint positions or whole poses, without a path."
+    "The motions of the baselines cannot be derived from this answer, so their savings are not "
+    "replayed. This is possible for goals that are joint positions or full poses, without a "
+    "path."
 )
 CONTROLS: dict[Literal["feed_forward", "pd", "both"], tuple[ControlName, ...]] = {
     "feed_forward": ("feed_forward",),
@@ -69,7 +70,7 @@ class ReplayRequest(AnswerRequest):
 
     control: Literal["feed_forward", "pd", "both"] = described(
         "Controller of the joints. `feed_forward`: torques known in advance, friction included, "
-        "and a PD loop. `pd`: the loop alone, as simple controllers have it.",
+        "and a PD loop. `pd`: the loop alone, as in simple controllers.",
         None,
         "feed_forward",
         default="both",

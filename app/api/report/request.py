@@ -30,7 +30,7 @@ class Sourced(Request):
 
     value: float = described("The number.", "1", 0.2, ge=0, le=1e12)
     source: Text = described(
-        "Where it is from, in words; `yours`: whoever asked gave it.",
+        "Source of the number; `yours`: given by the sender of the request.",
         None,
         "yours",
         default="yours",
@@ -45,8 +45,8 @@ class Costs(Request):
     numbers."""
 
     cycles_per_shift: Sourced | None = described(
-        "Motions or cycles per shift. Null: one each `period` or directly after the other, for 8 "
-        "hours.",
+        "Motions or cycles per shift. Null: one per `period`, or one directly after another, "
+        "for 8 hours.",
         None,
         {"value": 2400, "source": "line plan"},
         default=None,
@@ -58,7 +58,7 @@ class Costs(Request):
         default=None,
     )
     price: Sourced | None = described(
-        "Price of a kilowatt-hour, in `currency`. Null: no money.",
+        "Price of a kilowatt-hour, in `currency`. Null: no costs in money.",
         None,
         {"value": 0.2, "source": "contract of 2026"},
         default=None,
@@ -71,8 +71,8 @@ class Costs(Request):
         default=None,
     )
     control_box: Sourced | None = described(
-        "Power that the control box draws from the mains beside the arm [W], from a wattmeter. "
-        "Null: it is not counted.",
+        "Power that the control box draws from the mains in addition to the arm [W], measured "
+        "by a wattmeter. Null: not included.",
         None,
         {"value": 55.0, "source": "wattmeter"},
         default=None,
@@ -91,37 +91,39 @@ class ReportRequest(AnsweredRequest):
         default=None,
     )
     evaluate: EvaluateRequest | None = described(
-        "A body of `POST /evaluate` with a `log`: its moves are measured against predicted.",
+        "A body of `POST /evaluate` with a `log`: the measured energies of its moves are "
+        "compared with predictions.",
         None,
         {"log": LOG_ID},
         default=None,
     )
     placement: PlacementRequest | None = described(
-        "A body of `POST /placement`: its map, and its best place against the nominal one.",
+        "A body of `POST /placement`: its map, and its best place compared with the nominal place.",
         None,
         {"cycle": CYCLE, "region": {"x": [-0.3, 0.3], "y": [-0.2, 0.2]}},
         default=None,
     )
     title: Text | None = described(
-        "Title of the report. Null: one of the request's kind.",
+        "Title of the report. Null: a default title.",
         None,
         "Pick and place, three parts",
         default=None,
     )
     costs: Costs = described(
-        "What turns joules into costs.",
+        "Numbers that convert joules into costs.",
         None,
         {"price": {"value": 0.2, "source": "yours"}},
         default=Costs(),
     )
     advice: bool = described(
-        "Whether changes of a motion or a cycle that need less are computed, as by `POST /advice`.",
+        "Whether changes of a motion or a cycle that save energy are computed, as by `POST "
+        "/advice`.",
         None,
         True,
         default=True,
     )
     format: Format = described(
-        "`html`: a page that stands alone. `pdf`: pages of A4, made by Typst.",
+        "`html`: a stand-alone page. `pdf`: pages in A4, made by Typst.",
         None,
         "pdf",
         default="html",

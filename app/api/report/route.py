@@ -53,7 +53,7 @@ _FILE: dict[int | str, dict[str, Any]] = {
 )
 async def report(body: ReportRequest, tasks: ServiceTasks) -> Response:
     """Writes a page about a motion, a cycle or a placement: energy and its parts, savings against
-    ways within all limits or other places, costs per shift and year. Request and answer are
+    baselines within all limits or other places, costs per shift and year. Request and answer are
     attached, so that `joulepath check` can compute both again."""
     result = await tasks.result(ReportTask(body, tasks.request_id))
     name = f"joulepath-report.{body.format}"

@@ -68,10 +68,10 @@ class RobotSummary(Response):
         "Name of the API key that added it; null without one.", None, "press_shop"
     )
     energy_trust: str = described(
-        "What the energies of this robot rest on, from the trust letters of its parameters.",
+        "Basis of the energies of this robot, from the trust letters of its parameters.",
         None,
-        "Energies rest on the maker's own figures (link masses) and figures fitted to measured "
-        "data (friction).",
+        "Energies are based on the manufacturer's figures (link masses) and figures fitted to "
+        "measured data (friction).",
     )
 
 
@@ -106,7 +106,7 @@ class RobotDetail(RobotSummary):
     """The parameters of a robot, with their sources and trust letters."""
 
     trust: dict[str, str] = described(
-        "Meaning of the trust letters.", None, {"A": "maker's own file or data packet"}
+        "Meaning of the trust letters.", None, {"A": "published by the manufacturer"}
     )
     kinematics: Parameters = part("Geometry.")
     inertials: Parameters = part("Masses, centres of mass and inertias of the links.")
@@ -131,8 +131,8 @@ class RobotDetail(RobotSummary):
         "Default speed and acceleration of the robot's own controller; null if they are unknown."
     )
     form: list[list[FormBody]] = part(
-        "What each link looks like by these parameters, base first: tubes between the joints and "
-        "round housings with caps at them. No collision check sees it."
+        "What each link looks like by these parameters, base first: tubes between the joints "
+        "and round housings with caps at them. It is not used for collision checks."
     )
     example_move: ExampleMove | None = part(
         "A first move for a task without targets; null if the links overlap in every posture that "
@@ -142,7 +142,7 @@ class RobotDetail(RobotSummary):
         "Whether `GET /robots/{name}/meshes.glb` has the maker's meshes of the links.", None, True
     )
     warnings: list[str] = described(
-        "Of a robot that a user added: what is hardly real, and which parameters are engineering "
+        "Of a robot that a user added: implausible values, and parameters that are engineering "
         "defaults.",
         None,
         ["Engineering defaults, see their notes: limits.jerk."],

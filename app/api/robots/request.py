@@ -98,7 +98,7 @@ class OwnMotion(Request):
 
 
 class OwnArm(Request):
-    """An arm of a user's own: its URDF, and parameters beyond a URDF."""
+    """A user's own arm: its URDF, and parameters that a URDF does not have."""
 
     urdf: str = described(
         "Text of the URDF: a tree of links. Of its joints, those from `base` to `tip` move; they "
@@ -150,7 +150,7 @@ class OwnArm(Request):
     torque_side: Literal["motor", "link"] | None = described(
         "What the limits on the torque are for: the `motor` behind its gear, friction and rotor "
         "included; or the `link`, without them, as with torque sensors. Null: the motor, nearly "
-        "always the tighter reading.",
+        "always the tighter interpretation.",
         None,
         "link",
         default=None,

@@ -46,7 +46,7 @@ class ToolDetail(ToolSummary):
     """The figures of a tool with their sources and trust letters."""
 
     trust: dict[str, str] = described(
-        "Meaning of the trust letters.", None, {"A": "maker's own file or data packet"}
+        "Meaning of the trust letters.", None, {"A": "published by the manufacturer"}
     )
     mass: ToolFigure = part("Mass.")
     center_of_mass: ToolFigure = part("Centre of mass: [x, y, z].")

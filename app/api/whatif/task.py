@@ -111,7 +111,7 @@ class WhatifRequest(WithBodies):
         default=None,
     )
     changes: _Changes = described(
-        "Changes of the arm; each is made to the base alone.",
+        "Changes of the arm; each is applied separately to the base.",
         None,
         [{"name": "links of half the mass", "arm": {"link_mass_scale": 0.5}}],
     )

@@ -85,7 +85,7 @@ _EXAMPLES: dict[type[DeclaredError], DeclaredError] = {
             "one of them.",
             ["pick", "place"],
         ),
-        InvalidTable("q3 in line 17 is no finite number: correct or delete it.", 17, "q3"),
+        InvalidTable("q3 in line 17 is not a finite number: correct or delete it.", 17, "q3"),
         OutsideLimits("start", "elbow_joint", 3.5, -3.1416, 3.1416),
         UnknownRobot("r2d2", ["ur10e", "ur3e", "ur5e"]),
         UnknownTool(["franka_hand", "onrobot_rg2", "robotiq_2f_85"]),

@@ -70,7 +70,7 @@ it("one motion begins as often as it comes, and a request with a wait says it it
 it("joint positions of the service are told in degrees", () => {
   const limits = "give a value between -6.28319 and 6.28319 rad.";
   const said = `The start's shoulder_lift_joint is at 87.2665 rad: ${limits}`;
-  expect(asShown(`${said} It looks like degrees: divide it by 57.29578.`)).toBe(
+  expect(asShown(`${said} The value looks like degrees: divide it by 57.29578.`)).toBe(
     "The start's shoulder lift is at 5000.00°: give a value between −360.00° and 360.00°.",
   );
 });

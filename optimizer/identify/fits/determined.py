@@ -45,9 +45,9 @@ DETERMINED = DeterminedSettings()
 NOT_MOVING = "The joint hardly moves in these logs."
 UNCERTAIN = "Its standard deviation is {:.0%} of its value."
 NOT_TOLD = "The logs do not separate it from other figures."
-IMPOSSIBLE = "The fit puts it at {:.3g}, which no drive has."
+IMPOSSIBLE = "The fit gives {:.3g}, which is implausible for a drive."
 LAW_KEPT = "The joint's Coulomb friction is kept, and so is the rest of its law."
-AT_BOUND = "The fit puts it at its bound, {:g}."
+AT_BOUND = "The fit gives its bound, {:g}."
 REJECTED = (
     "{} The robot's own value is {:.0f} standard deviations away, so that it is not kept: check "
     "the payload, the links, the torque constants, zeros and signs of the positions, and the side "

@@ -31,8 +31,8 @@ BEHIND_GEARS = (
     "do not act: log motor currents, or the power of the arm's bus."
 )
 LIKE_DRIVES = (
-    "It is {:.0%} of the Coulomb friction of motor and gears: the torques seem to be those of the "
-    "motors. Then give `torque_side`."
+    "It is {:.0%} of the Coulomb friction of motor and gears: the torques seem to be those of "
+    "the motors. If so, give `torque_side`."
 )
 
 

@@ -44,7 +44,7 @@ UNKNOWN_MASS = (
     "The standard deviation of the mass is {:.2g} kg: log poses in which the arm is stretched out "
     "and folded, with the payload and without it."
 )
-NO_CENTRE = "The mass is 0 within its deviation, so that it has no centre."
+NO_CENTRE = "The mass is 0 within its standard deviation, so its centre is not determined."
 
 
 @dataclass(frozen=True)
@@ -297,8 +297,8 @@ def _payload_of_body(robot: Robot, log: int, body: Array, spread: Array) -> Iden
     if mass < -max(3 * sd, min_mass):
         raise InvalidProblem(
             "logs",
-            f"The last of the logs carries {-mass:.3g} kg less than the others say of theirs: name "
-            "the log with the payload last, and give the `payload` of the others.",
+            f"The arm carries {-mass:.3g} kg less in the last log than in the others: name the "
+            "log with the payload last, and give the `payload` of the others.",
         )
     if not max(sd, min_mass) <= DETERMINED.max_relative_sd * mass:
         known = sd <= PAYLOAD_FIT.max_sd * robot.rated_payload

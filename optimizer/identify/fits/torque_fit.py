@@ -215,8 +215,8 @@ def undetermined(robot: Robot, block: JointBlock) -> dict[Name, str]:
             spread, limit = block.spread[name[1]], float(robot.limits.tau_max[name[1]])
             if spread < TORQUE_FIT.min_load_spread * limit:
                 held[name] = (
-                    f"The rigid torque varies by {spread:.2g} N·m only, of a limit of {limit:.3g} "
-                    "N·m."
+                    f"The rigid torque varies by only {spread:.2g} N·m, with a limit of "
+                    f"{limit:.3g} N·m."
                 )
     return held
 

@@ -67,7 +67,7 @@ def _lines(file: BinaryIO, kind: str, max_bytes: int) -> Generator[bytes]:
         if not head:
             raise InvalidTable(
                 f"The bag has no messages of the type {JOINT_STATE}: record the topic of the "
-                "joints' states, or export the log as CSV."
+                "joint states, or export the log as CSV."
             )
         first, _ = Counter((tuple(each.name), _kinds(each)) for _, each in head).most_common(1)[0]
         names, kinds = first
@@ -108,8 +108,8 @@ def _states(path: Path) -> Iterator[tuple[int, Any]]:
     # the library has no base class for its errors about broken files
     except Exception as error:
         raise InvalidTable(
-            f"The bag cannot be read ({type(error).__name__}: {error}): record it anew, or export "
-            "the log as CSV."
+            f"The bag cannot be read ({type(error).__name__}: {error}): record it again, or "
+            "export the log as CSV."
         ) from None
 
 

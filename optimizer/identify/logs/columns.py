@@ -30,7 +30,7 @@ _STAMPS = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"), ("secs", "nan
 """Ends of the names of the two columns of a stamp of time."""
 _KNOWN_HEADERS = (
     "timestamp, actual_q_0, … (RTDE), t, q1, … (this service's own) or time, position1, … (ROS "
-    "JointState as CSV). Otherwise say in `columns` which columns hold what"
+    "JointState as CSV). Otherwise name the columns in `columns`"
 )
 
 
@@ -127,7 +127,7 @@ def recognised(names: Sequence[str], nq: int) -> Columns:
         time = time_of(names, log_format.time)
         if not time:
             raise InvalidTable(
-                f"The header has joint positions, as {names[found['q'][0]]}, but no column "
+                f"The header has joint positions such as {names[found['q'][0]]}, but no column "
                 f"`{log_format.time.strip('%?')}`: a log needs the time [s] of every row.",
                 1,
                 log_format.time.strip("%?"),
@@ -143,7 +143,7 @@ def recognised(names: Sequence[str], nq: int) -> Columns:
             1,
         )
     raise InvalidTable(
-        f"The header names no joint positions that are known: begin it with {_KNOWN_HEADERS}.", 1
+        f"The header has no known names of joint positions: begin it with {_KNOWN_HEADERS}.", 1
     )
 
 
@@ -228,7 +228,7 @@ def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
     if found and sorted(found) not in ([*range(len(found))], [*range(1, len(found) + 1)]):
         name = names[found[min(found)]]
         raise InvalidTable(
-            f"The columns like {name} are not numbered without gaps from 0 or from 1: a log has "
+            f"The columns like {name} are not numbered without gaps from 0 or 1: a log needs "
             "every joint.",
             1,
             name,
@@ -268,8 +268,7 @@ def mapped(names: Sequence[str], columns: ColumnMap, nq: int) -> Columns:
     if unknown or not {"time", "q"} <= set(columns):
         raise InvalidProblem(
             "columns",
-            "columns must name `time` and `q`, and beside them only "
-            f"{', '.join(Columns.MAPPED[2:])}.",
+            f"columns must name `time` and `q`, and may also name {', '.join(Columns.MAPPED[2:])}.",
         )
     found: dict[str, tuple[int, ...]] = {}
     for group, given in columns.items():
@@ -281,7 +280,8 @@ def mapped(names: Sequence[str], columns: ColumnMap, nq: int) -> Columns:
         if group == "wrench" and len(wanted) != WRENCH_COLUMNS:
             raise InvalidProblem(
                 "columns.wrench",
-                "columns.wrench must name six columns: of the force, then the torque.",
+                "columns.wrench must name six columns: three of the force, then three of the "
+                "torque.",
             )
         if None in wanted and (group not in EFFORTS or not any(wanted)):
             raise InvalidProblem(
@@ -295,7 +295,7 @@ def mapped(names: Sequence[str], columns: ColumnMap, nq: int) -> Columns:
     if twice is not None:
         raise InvalidProblem(
             "columns",
-            f"columns must name every column once, and names {names[twice]}, number {twice + 1}, "
+            f"columns must name every column once, but names {names[twice]}, number {twice + 1}, "
             "more often.",
         )
     time = (*found.pop("time"), *found.pop("nanoseconds", ()))
@@ -333,7 +333,7 @@ def _check_counts(
             name = names[indices[0]] if indices else None
             raise InvalidTable(
                 f"The header has {len(indices)} columns like {name}, but the robot has {nq} "
-                "joints: a log is of one robot, with one column for each of its joints.",
+                "joints: a log belongs to one robot, with one column for each of its joints.",
                 1,
                 name,
             )

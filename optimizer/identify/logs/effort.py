@@ -122,9 +122,9 @@ def _log_distance(slope: float, expected: float) -> float:
 
 
 OTHER_CAUSES = (
-    "Otherwise the log is of another robot, its positions have other zeros or signs, the joints "
-    "are in another order than the robot's, from base to flange (name the columns in `columns`), "
-    "or `units`, `current_units`, `payload` or `gravity` are not as given."
+    "Otherwise the log belongs to another robot, its positions have other zeros or signs, the "
+    "joints are in another order than the robot's, from base to flange (name the columns in "
+    "`columns`), or `units`, `current_units`, `payload` or `gravity` are wrong."
 )
 """Other causes of efforts in contradiction to the arm."""
 _NAMED: dict[ChannelName, EffortMeaning] = {"current": "current", "torque": "torque"}
@@ -173,10 +173,9 @@ def choose_meaning(
     """
     if found.meaning == "external" and requested != "external":
         raise EffortNotUsable(
-            "The logged efforts do not carry the arm's weight, and say nothing of it. If they "
-            "are without gravity, log motor currents (with the driver of ROS 2: "
-            "actual_current_as_torque off), or give effort=external to keep motion and power. "
-            f"{OTHER_CAUSES}",
+            "The logged efforts do not contain the arm's weight. If they are without gravity, "
+            "log motor currents (with the driver of ROS 2: actual_current_as_torque off), or "
+            f"give effort=external to keep motion and power. {OTHER_CAUSES}",
             "external",
             found.slope,
         )
@@ -196,8 +195,8 @@ def choose_meaning(
     # if the slopes contradict each other or every meaning, the name is no help
     if group in _NAMED and all(slope is None for slope in found.slope.values()):
         remarks.append(
-            f"The motion does not tell what the efforts are: they are taken as {group}, by their "
-            "name."
+            "The motion does not determine the meaning of the efforts: they are taken as "
+            f"{group}, by their name."
         )
         return EffortReport(_NAMED[group], 0.0, found.slope)
     raise _unclear(found)
@@ -208,13 +207,13 @@ def _unclear(found: EffortReport) -> EffortNotUsable:
     slopes = [slope for slope in found.slope.values() if slope is not None]
     if slopes and max(slopes) < 0:
         return EffortNotUsable(
-            "The logged efforts have the other sign than the weight of the arm: turn the sign of "
-            "their columns, or give `gravity` in the frame of the base if the arm hangs.",
+            "The logged efforts have the opposite sign to the weight of the arm: invert the "
+            "sign of their columns, or give `gravity` in the frame of the base if the arm hangs.",
             None,
             found.slope,
         )
     return EffortNotUsable(
-        "It is not clear what the logged efforts are: give effort=current for motor currents "
+        "The meaning of the logged efforts is unclear: give effort=current for motor currents "
         "[A], effort=torque for torques [N·m] or effort=external for torques without gravity. "
         f"{OTHER_CAUSES}",
         None,

@@ -132,10 +132,10 @@ def check_signs(found: Sequence[JointEffort], names: Sequence[str]) -> None:
     if wrong and len(wrong) < len(found):
         columns = ", ".join(names[joint] for joint in wrong)
         raise EffortNotUsable(
-            f"The efforts in {columns} have the other sign than the motion: friction would drive "
-            "the joint. Turn their sign, or that of the joint's positions and speeds; or the "
-            "joints are in another order than the robot's, from base to flange (name the columns "
-            "in `columns`).",
+            f"The efforts in {columns} have the opposite sign to the motion, as if friction "
+            "drove the joint. Invert their sign, or that of the joint's positions and speeds; "
+            "or the joints are in another order than the robot's, from base to flange (name the "
+            "columns in `columns`).",
             None,
             {},
         )
@@ -164,8 +164,8 @@ def effort_warnings(
     if large.any():
         yield (
             f"The efforts of {named_joints(np.flatnonzero(large).tolist())} are beyond "
-            f"{settings.max_torque:g} times the greatest torque of the joint: check their unit, "
-            "column by column."
+            f"{settings.max_torque:g} times the largest torque of the joint: check the unit of "
+            "every column."
         )
     odd = [
         each.joint
@@ -174,9 +174,9 @@ def effort_warnings(
     ]
     if odd:
         yield (
-            f"The efforts of {named_joints(odd)} are not what the motion makes by the "
-            "robot's model: check the order of the joints, zeros and signs of the positions, "
-            "units, payload and gravity."
+            f"The efforts of {named_joints(odd)} do not match the motion in the robot's model: "
+            "check the order of the joints, zeros and signs of the positions, units, payload "
+            "and gravity."
         )
 
 

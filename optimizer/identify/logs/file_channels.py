@@ -160,8 +160,7 @@ def _check_positions(
     channels["q"], turned = without_whole_turns(q, robot)
     if turned:
         remarks.append(
-            f"The positions of {named_joints(turned)} leap by whole turns, and are "
-            "taken without the leaps."
+            f"The positions of {named_joints(turned)} jump by whole turns; the jumps are removed."
         )
     q = channels["q"][grid.kept] if grid.repeated else channels["q"]
     check_leaps(q, grid, lines, robot, [columns.names[k] for k in columns.groups["q"]])
@@ -212,7 +211,7 @@ def _even_if_jittering(grid: Grid, q: Array, remarks: list[str]) -> Grid:
     if by_time <= JITTER.noise_ratio * by_row:
         return grid
     remarks.append(
-        "The times jitter, and the positions do not: they are times of writing, and the rows "
+        "The times jitter, but the positions do not: these are times of writing, so the rows "
         "are taken as evenly spaced. Log the time of the controller."
     )
     return replace(grid, uniform=True)

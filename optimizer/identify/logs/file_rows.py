@@ -81,7 +81,7 @@ class LogSource:
             line = self._file.readline(size)
         except (OSError, EOFError, ZlibError):
             raise InvalidTable(
-                "The file is broken gzip: pack it anew, or send it unpacked."
+                "The file is broken gzip: pack it again, or send it unpacked."
             ) from None
         self._read += len(line)
         if self._read > self._max_bytes:

@@ -134,8 +134,8 @@ def grid_of(t: Array, rows: Array, column: str) -> Grid:
         worst = int(steps.argmax())
         row = int(rows[distinct[worst + 1]])
         raise InvalidTable(
-            f"More than half of the log is missing, {steps[worst]:.4g} s before line {row} alone: "
-            "divide it there.",
+            f"More than half of the log is missing, {steps[worst]:.4g} s before line {row} "
+            "alone: divide the log there.",
             row,
             column,
         )
@@ -166,7 +166,7 @@ def _distinct_times(t: Array, rows: Array, column: str) -> Indices:
     if (steps < 0).any():
         row = int(rows[int(np.argmax(steps < 0)) + 1])
         raise InvalidTable(
-            f"{column} goes back in line {row}: a log is one recording, in the order of time.",
+            f"{column} decreases in line {row}: a log is one recording, in the order of time.",
             row,
             column,
         )
@@ -174,8 +174,7 @@ def _distinct_times(t: Array, rows: Array, column: str) -> Indices:
     repeated = len(t) - len(distinct)
     if repeated > GRID.max_repeated * len(t):
         raise InvalidTable(
-            f"{column} repeats itself in {repeated} of {len(t)} rows: write times with more "
-            "digits.",
+            f"{column} repeats in {repeated} of {len(t)} rows: write times with more digits.",
             None,
             column,
         )

@@ -172,7 +172,7 @@ def check_units(
                 if 0 <= k < len(units) and wrong.fullmatch(units[k].strip()):
                     name = columns.names[k]
                     raise InvalidTable(
-                        f"{name} is in another unit by line {row} than it is read in: give "
+                        f"{name} has another unit in line {row} than the one it is read in: give "
                         f"{remedy}.",
                         row,
                         name,

@@ -48,11 +48,11 @@ def log_warnings(log: Log, grid: Grid, columns: Columns) -> list[str]:
     information."""
     found = [*_times(grid), *_constant(log), *_saturated(log), *_spikes(log)]
     if not log.payload_known:
-        found.append("No payload is given or logged: the arm is taken to have carried nothing.")
+        found.append("No payload is given or logged: the payload is assumed to be zero.")
     if columns.format == "ros" and any(name.rstrip("]")[-1:].isdigit() for name in columns.names):
         found.append(
-            "The joints are taken in the order of their numbers, from base to flange: drivers of "
-            "ROS may publish them in another one. Then name the columns in `columns`."
+            "The joints are taken in the order of their numbers, from base to flange: ROS "
+            "drivers may publish them in another order. If so, name the columns in `columns`."
         )
     return found
 
@@ -65,14 +65,11 @@ def _times(grid: Grid) -> Iterator[str]:
             f"{grid.time[grid.gaps[lengths.argmax(), 0]]:.3g} s. No move reaches across one."
         )
     if grid.unit != "s":
-        yield (
-            f"The times are taken for {grid.unit}: no other unit makes a rate of them that a "
-            "log has."
-        )
+        yield f"The times are read in {grid.unit}: no other unit gives a plausible rate."
     if grid.repeated:
         yield (
-            f"Rows with the time of the row before: {grid.repeated}. The first row of each time "
-            "counts."
+            f"Rows with the time of the previous row: {grid.repeated}. Only the first row of "
+            "each time is used."
         )
 
 
@@ -109,9 +106,7 @@ def _saturated(log: Log) -> Iterator[str]:
         if joint not in coarse and _is_saturated(effort, moving)
     ]
     if wrong:
-        yield (
-            f"The effort of {named_joints(wrong)} stays at its greatest value: it is cut off there."
-        )
+        yield f"The effort of {named_joints(wrong)} is clipped at its largest value."
 
 
 def _is_saturated(effort: Array, moving: Mask) -> bool:

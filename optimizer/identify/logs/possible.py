@@ -77,7 +77,7 @@ def check_sizes(
             at, column = wrong[0].tolist()
             row, name = int(lines[at]), names[used[indices[column]]]
             raise InvalidTable(
-                f"{name} in line {row} is too large to be a robot's: correct or delete it.",
+                f"{name} in line {row} is too large for a robot: correct or delete it.",
                 row,
                 name,
             )
@@ -161,11 +161,11 @@ def check_leaps(q: Array, grid: Grid, lines: Array, robot: Robot, names: Sequenc
                 at = int(np.argmax(wrong))
                 row, name = int(lines[at + rows]), names[joint]
                 raise InvalidTable(
-                    f"{name} changes by {change[at]:.3g} rad from line {lines[at]} to line {row}, "
-                    f"within {steps[at]:.3g} s, and the joint does at most {v_max:.3g} rad/s. "
-                    "Delete a wrong row; divide the log where rows were left out; give positions "
-                    f"in rad (or units=deg), and times in seconds, {GRID.min_rate:g} rows per "
-                    "second or more.",
+                    f"{name} changes by {change[at]:.3g} rad from line {lines[at]} to line "
+                    f"{row}, within {steps[at]:.3g} s, but the joint reaches at most {v_max:.3g} "
+                    "rad/s. Delete a wrong row; divide the log where rows were left out; give "
+                    f"positions in rad (or units=deg), and times in seconds, {GRID.min_rate:g} "
+                    "rows per second or more.",
                     row,
                     name,
                 )
@@ -188,8 +188,8 @@ def check_coarse(q: Array, grid: Grid, column: str) -> None:
         coarse = int((q[repeated] != q[repeated - 1]).any(axis=1).sum())
     if coarse > PLAUSIBLE.max_coarse * len(q):
         raise InvalidTable(
-            f"{column} repeats itself in {coarse} of {len(q)} rows that differ: write times with "
-            "more digits.",
+            f"{column} repeats in {coarse} of {len(q)} rows that differ: write times with more "
+            "digits.",
             None,
             column,
         )

@@ -70,17 +70,16 @@ def speeds_of(
     elif wrong := _inconsistent_speeds(q, v, rate, columns, remarks):
         v = _replaced(v, derivative(q[:, wrong], rate), wrong)
         remarks.append(
-            f"The speeds of {named_joints(wrong)} do not fit their positions, and are "
-            "made from these: check units, signs and the order of the columns."
+            f"The speeds of {named_joints(wrong)} do not fit the positions, and are computed "
+            "from them: check units, signs and the order of the columns."
         )
     if a is None:
         return v, derivative(v, rate)
     odd = _inconsistent_accelerations(v, a, rate)
     if set(odd) - set(wrong):
         remarks.append(
-            f"The accelerations of {named_joints(odd)} are not the change of their "
-            "speeds, and are made from these: check units, signs and the order of the columns, "
-            "or leave them out."
+            f"The accelerations of {named_joints(odd)} do not fit the speeds, and are computed "
+            "from them: check units, signs and the order of the columns, or leave them out."
         )
     odd = sorted({*odd, *wrong})
     return v, _replaced(a, derivative(v[:, odd], rate), odd) if odd else a
@@ -112,8 +111,8 @@ def _inconsistent_speeds(
         if np.ptp(q[:, joint]) == 0 and size > SPEEDS.min_speed:
             name, speed = (columns.names[columns.groups[each][joint]] for each in ("q", "v"))
             raise InvalidTable(
-                f"{name} never changes, though the joint moves by its speeds in {speed}: log its "
-                "position, or write 0 into its speeds if the joint stood still.",
+                f"{name} never changes, although the joint moves according to its speeds in "
+                f"{speed}: log its position, or set its speeds to 0 if the joint was at rest.",
                 None,
                 name,
             )
@@ -164,9 +163,9 @@ def _check_factor(factor: float, name: str, clock: str) -> None:
     if factor == 0:
         relation = "0, while the positions change"
     raise InvalidTable(
-        f"The speeds, as {name}, are {relation}: give both in one unit (rad and rad/s, or degrees "
-        "with units=deg) and with one sign, or leave the columns of speeds and accelerations out, "
-        "and they are made from the positions.",
+        f"The speeds, such as {name}, are {relation}: give both in one unit (rad and rad/s, or "
+        "degrees with units=deg) and with one sign, or leave the columns of speeds and "
+        "accelerations out, to compute them from the positions.",
         None,
         name,
     )

@@ -34,7 +34,7 @@ _LOGGING_ADVICE = {
     "load": "Log slow moves of this joint with the arm stretched out and folded, or with a "
     "payload.",
     "curved": "Log moves of this joint at several constant speeds.",
-    "rotor_inertia": "Log moves in which this joint speeds up as fast as it may.",
+    "rotor_inertia": "Log moves in which this joint accelerates as fast as it may.",
     "torque_constant": "Log motor currents of slow moves with a known payload, the arm stretched "
     "out and folded.",
     "idle_power": "Log ten seconds at rest with the power of the arm's bus, the arm stretched "

@@ -144,7 +144,7 @@ def rows_of(
     for log in logs:
         if log.robot != robot.name or log.joints != robot.nq:
             raise InvalidProblem(
-                "logs", f"A log is of {log.robot} ({log.joints} joints), not of {robot.name}."
+                "logs", f"A log belongs to {log.robot} ({log.joints} joints), not to {robot.name}."
             )
         _check_power(robot, log)
     meanings = sorted({str(log.effort_meaning) for log in logs if log.carries_weight})
@@ -157,7 +157,7 @@ def rows_of(
         raise InvalidProblem(
             "logs",
             "The torques of the logs must be of the same side of the gears, not of motors and "
-            "links: identify from each side by itself.",
+            "links: identify from each side separately.",
         )
     stride = _stride(logs, ROWS.max_regressor_rows if regressor else ROWS.max_rows)
     pieces, moves, number = [], 0, 0
@@ -217,10 +217,10 @@ def _check_power(robot: Robot, log: Log) -> None:
     if not expected / ROWS.max_power_ratio < mean < ROWS.max_power_ratio * expected:
         raise InvalidProblem(
             "logs",
-            f"The power of {'a log' if log.name is None else log.name} is {mean:.3g} W in the "
-            f"mean, and {robot.name} draws some {expected:.3g} W at rest: this is not the power "
-            "of the arm's bus in W. Log it in W, with the sign that is positive where the arm "
-            "draws power, or leave its column out.",
+            f"The power of {'a log' if log.name is None else log.name} is {mean:.3g} W on "
+            f"average, and {robot.name} draws some {expected:.3g} W at rest: this is not the "
+            "power of the arm's bus in W. Log it in W, with the sign that is positive where the "
+            "arm draws power, or leave its column out.",
         )
 
 
@@ -252,7 +252,7 @@ def _rows_of_log(
     size = max(1, round(log.rate / ROWS.rate))
     starts, of_move, rest = _blocks(log, size, stride)
     if not len(starts):
-        raise InvalidProblem("logs", "A log has no move that is as long as a row.")
+        raise InvalidProblem("logs", "A log has no move as long as a row.")
 
     def mean(channel: Array | None, shape: tuple[int, ...]) -> Array:
         if channel is None:

@@ -77,8 +77,8 @@ def _check(path: ToolPath, distance: Array) -> None:
             apart = f"{length:.4g} m apart" if last else f"{length:.4g} m from the one before"
             raise InvalidProblem(
                 "path" if last else f"path.via.{k}",
-                f"{which} {apart}: they must differ, and be at least as far apart as path.blend "
-                f"takes of the way between them, {blended:.4g} m.",
+                f"{which} {apart}: they must differ, and be at least {blended:.4g} m apart, as "
+                "path.blend takes this length between them.",
             )
 
 
@@ -218,8 +218,8 @@ class Arc:
         if not radius < SETTINGS.straight * longest:
             raise InvalidProblem(
                 "path.via.0",
-                "The start, this pose and the goal are on a line, so that no arc goes through "
-                'them: move it aside, or leave "shape" out for straight lines.',
+                "The start, this pose and the goal are on a line, so no arc passes through "
+                'them: move this pose aside, or leave "shape" out for straight lines.',
             )
         first = -offset
         second = np.cross(normal / np.sqrt(area), first)

@@ -109,7 +109,7 @@ def follow(
         OutsideLimits: the guess is outside the limits.
         DeadlineExceeded: the deadline passed before the first search.
     """
-    check_uncoupled(arm.robot, "points", "Tool paths are not followed")
+    check_uncoupled(arm.robot, "points", "Tool paths are not supported")
     guess = arm.inside("guess", frozen(guess, (arm.robot.nq,), "guess"))
     if not len(targets):
         raise InvalidProblem("points", "The path needs at least one point.")

@@ -57,13 +57,13 @@ class SolveReason(Enum):
     CONVERGED = "converged"
     DEADLINE_PASSED = "the deadline passed"
     STOPPED_BY_DEADLINE = "the deadline ended its optimisation"
-    PROMISES_NO_LESS = "ended early: it comes to no less energy than the best motion found"
+    PROMISES_NO_LESS = "ended early: its energy does not fall below that of the best motion found"
     COLLIDES_AND_COSTS_MORE = (
-        "not solved further: its motion collides, and even so needs at least as much energy "
-        "as the best motion found"
+        "not solved further: its motion collides, and already needs at least as much energy as "
+        "the best motion found"
     )
     BEST_OF_GENERATIONS = "the best of {0} generations"
-    STOPS_AT_PASSES = "the motions from rest to rest: none that passes was found"
+    STOPS_AT_PASSES = "the motions from rest to rest: no passing motion was found"
 
     KNOWN_MOTION = "a known motion"
     KNOWN_MOTION_RETIMED = "a known motion, retimed"
@@ -96,7 +96,7 @@ class SolveReason(Enum):
     TIME_OPTIMAL_TAKES_LONGER = "the time-optimal motion takes at least {0:.4f} s within the limits"
     TOOL_PATH_TAKES_LONGER = "along the path, the fastest motion found takes {0:.4f} s"
 
-    NO_FINER_SCALING = "there is no other space of time scalings"
+    NO_FINER_SCALING = "there is no other family of time scalings"
     LEAST_SPEED_NOT_KEPT = (
         "found no motion within the limits that keeps path.speed.min between its ramps: give a "
         "smaller one, a longer path.speed.ramp, or a larger path.blend"
@@ -109,7 +109,7 @@ class SolveReason(Enum):
         "found no motion within the path's tolerance: give a larger one, or a larger path.blend"
     )
     PATH_TOO_SHARP = "the path turns too sharply for its tolerance: give a larger path.blend"
-    TOOL_TURNS_IN_PLACE = "the tool turns in place on its way: no path.speed can be held there"
+    TOOL_TURNS_IN_PLACE = "the tool turns in place on the path, where no path.speed can be kept"
     FIXED_SPEED_TOO_FAST = (
         "the joints' limits do not allow the fixed path.speed with ramps of path.speed.ramp: give "
         "a lower speed, a longer path.speed.ramp, or a larger path.blend"
@@ -118,7 +118,7 @@ class SolveReason(Enum):
         "found no motion that holds the fixed path.speed: give a larger path.blend or "
         "path.tolerance"
     )
-    TURN_OUT_OF_REACH = "the arm cannot be where the turn of the tool leads"
+    TURN_OUT_OF_REACH = "the rotation of the tool leads the arm out of reach"
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ def test_a_robot_is_added_used_and_removed(here: Here, tmp_path: Path) -> None:
     first, warning = out.decode().splitlines()
     assert (code, err) == (0, b"")
     assert (
-        first.startswith("cell_arm: 2 joints. Energies rest on")
+        first.startswith("cell_arm: 2 joints. Energies are based on")
         and "drives.rotor_inertia" in warning
     )
     code, problem = here.problem("robots", "add", str(file))

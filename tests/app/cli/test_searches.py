@@ -73,7 +73,7 @@ def test_a_target_that_is_none_is_wrong_usage(here: Here, text: str) -> None:
     [
         (("optimize",), b"--from is missing"),
         (("pareto", "--from", FROM), b"--to is missing"),
-        (("compare", "-", "--robot", "ur5e"), b"cannot be changed by options"),
+        (("compare", "-", "--robot", "ur5e"), b"options cannot change"),
         (("ik",), b"--pose is missing"),
         (("ik", "--pose", FROM), b"--pose takes a pose"),
     ],

@@ -83,7 +83,7 @@ def test_a_kept_answer_is_exported_as_it_is_when_sent_whole(
         assert by_id.content == by_path.content == whole.content
     assert by_id.headers["content-disposition"].startswith('attachment; filename="joulepath-ur5e.')
     assert float(by_id.headers["joulepath-worst-ratio"]) <= 1 + 1e-6
-    assert "Not run on hardware" in by_id.headers["joulepath-notes"]
+    assert "Not tested on hardware" in by_id.headers["joulepath-notes"]
 
 
 def test_the_document_describes_every_format(client: TestClient) -> None:

@@ -131,7 +131,7 @@ def test_rods_beside_the_chain_are_held_and_named() -> None:
         "crank", "swivel rod", "0 0.1 0", ACROSS, "-1 1", '<mimic joint="a2"/>'
     )
     beside = description(PALLETISER.replace("</robot>", rod + "</robot>"))
-    with pytest.raises(InvalidArm, match="'crank' moves a link beside"):
+    with pytest.raises(InvalidArm, match="'crank' moves a link that is not between"):
         own_figures("mine", beside)
     warnings = own_figures("mine", replace(beside, locked="others"))[1]
     assert any("mimic moving ones: crank" in each for each in warnings)
@@ -147,7 +147,7 @@ def test_friction_of_a_follower_is_named() -> None:
     ("law", "said"),
     [
         ('<mimic joint="m2"/>', "'m2' mimics itself"),
-        ('<mimic joint="crank"/>', "'crank', which is no moving joint between base and tip"),
+        ('<mimic joint="crank"/>', "'crank', which is not a moving joint between base and tip"),
         ('<mimic joint="a2" multiplier="0"/>', "multiplier of 0"),
         ('<mimic joint="a2" offset="4"/>', "'m2' mimics 'a2', and within its own range"),
         ('<mimic joint="a2" multiplier="one"/>', "multiplier"),

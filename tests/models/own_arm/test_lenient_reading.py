@@ -155,7 +155,7 @@ def test_what_has_no_size_is_no_shape(kind: str, sizes: str) -> None:
     empty = PLAIN.urdf.replace(SHAPE, f"<{kind} {sizes}/>")
     figures, warnings = own_figures("mine", replace(PLAIN, urdf=empty))
     assert figures == own_figures("mine", replace(PLAIN, urdf=none))[0]
-    assert f"Shapes that are not read count as nothing: {kind} of no size." in warnings
+    assert f"Unsupported shapes are ignored: {kind} of no size." in warnings
 
 
 def test_a_mesh_of_a_package_is_found_by_the_end_of_its_path() -> None:

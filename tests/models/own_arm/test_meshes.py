@@ -294,7 +294,7 @@ def test_the_longest_agreement_of_paths_counts() -> None:
 
 
 def test_a_zip_that_is_none_or_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(InvalidArm, match="no zip"):
+    with pytest.raises(InvalidArm, match="not a readable zip"):
         in_zip(b"PK")
     monkeypatch.setattr(
         "joulepath.models.own_arm.mesh_files.LIMITS", dataclasses.replace(LIMITS, mesh_bytes=10_000)

@@ -61,10 +61,10 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "document type", {"urdf": '<!DOCTYPE r [<!ENTITY a "b">]>' + RICH}),
     ("tip", "no link 'nowhere'", {"tip": "nowhere"}),
     ("base", "no link 'nowhere'", {"base": "nowhere"}),
-    ("tip", "not carried by the base 'hand'", {"tip": "forearm", "base": "hand"}),
+    ("tip", "not connected to the base 'hand'", {"tip": "forearm", "base": "hand"}),
     ("tip", "0 joints move", {"tip": "pedestal", "base": "world"}),
     ("locked", "no joint 'thumb'", {"locked": {"thumb": 0.0}}),
-    ("locked", "'finger' moves a link beside", {"locked": None}),
+    ("locked", "'finger' moves a link that is not between", {"locked": None}),
     ("urdf", "'finger' is prismatic", {"tip": "finger", "locked": None}),
     (
         "urdf",
@@ -81,7 +81,11 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "'elbow' has no <limit>", change('lower="-2" upper="2.5" ', "")),
     ("urdf", "'elbow' cannot.*: write its range", change('lower="-2" upper="2.5"', NO_RANGE)),
     ("urdf", "'elbow' cannot.*: exchange", change('lower="-2" upper="2.5"', EXCHANGED)),
-    ("urdf", "`upper` that is no finite number, but 'inf'", change('upper="2.5"', 'upper="inf"')),
+    (
+        "urdf",
+        "`upper` that is not a finite number, but 'inf'",
+        change('upper="2.5"', 'upper="inf"'),
+    ),
     ("urdf", "Two links.*: hand. Give", change('name="wrist"', 'name="hand"')),
     ("urdf", "Two joints.*: pan. Give", change('"twist"', '"pan"')),
     ("urdf", r"but 'a\\u200b'", change('"twist"', '"a\u200b"')),
@@ -98,8 +102,8 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
         "that the URDF does not have",
         change('<child link="wrist"/>', '<child link="wirst"/>'),
     ),
-    ("urdf", "hangs on two joints", change('<child link="finger"/>', '<child link="wrist"/>')),
-    ("urdf", "in a loop: hand, wrist, ", LOOP),
+    ("urdf", "child of two joints", change('<child link="finger"/>', '<child link="wrist"/>')),
+    ("urdf", "form a loop: hand, wrist, ", LOOP),
     (
         "urdf",
         "one root link",
@@ -178,7 +182,7 @@ def test_what_is_hardly_real_is_remarked() -> None:
 @pytest.mark.parametrize(
     ("text", "field", "words"),
     [
-        ("urdf: [", "", "no description in YAML"),
+        ("urdf: [", "", "not a description in YAML"),
         ("- 1", "", "object"),
         ("urdf: arm.urdf\ntip: tool\nacceleration: 8", "payload", "required"),
         ("urdf: none.urdf\ntip: tool\nacceleration: 8\npayload: 2", "urdf", "There is no file"),

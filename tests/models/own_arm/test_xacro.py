@@ -89,7 +89,7 @@ def test_meshes_of_a_repository_in_a_workspace(arm: Path, tmp_path: Path) -> Non
 def test_a_file_of_macros_alone(arm: Path) -> None:
     pytest.importorskip("xacrodoc")
     arm.write_text(arm.read_text().replace("cell_arm/urdf/arm.urdf", "macros/urdf/places"))
-    with pytest.raises(InvalidArm, match="name the one that uses them"):
+    with pytest.raises(InvalidArm, match="name the file that uses them"):
         load_robot(arm)
 
 

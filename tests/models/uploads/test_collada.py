@@ -81,7 +81,7 @@ def test_an_empty_line_before_the_declaration_has_no_effect() -> None:
 @pytest.mark.parametrize(
     ("content", "cause"),
     [
-        (b"<robot/>", "no COLLADA"),
+        (b"<robot/>", "not a COLLADA"),
         (
             file_of(INSTANCE).replace(b"</mesh>", b"<triangles><p>0 1 4</p></triangles></mesh>"),
             "faces with corners outside",

@@ -42,7 +42,7 @@ def test_the_motion_generator_has_the_same_rows() -> None:
     assert f"kRows = {len(rows)};" in text and text.count("{") == text.count("}")
     q, _, _ = program.at(np.minimum(np.arange(len(rows)) * 1e-3, program.duration))
     assert np.abs(np.array(rows) - q).max() <= FRANKA.rounding
-    assert "// Not run on hardware" in text
+    assert "// Not tested on hardware" in text
 
 
 def test_what_no_motion_generator_can_do_is_refused() -> None:

@@ -110,7 +110,7 @@ def test_units_of_time(recording: Recording, unit: str, per_second: float, begin
     same(reading, recording)
     assert reading.log.rate == pytest.approx(125.0, rel=1e-6)
     assert (
-        [each for each in remarks(reading) if f"taken for {unit}:" in each]
+        [each for each in remarks(reading) if f"times are read in {unit}:" in each]
         == remarks(reading)
         != []
     )
@@ -270,7 +270,7 @@ def test_turns_of_sensors_that_count_in_circles(recording: Recording) -> None:
     wrapped = replace(recording, q=np.mod(recording.q, 2 * np.pi))
     reading = read_log(csv_of(wrapped, without="va"), ROBOT)
     np.testing.assert_allclose(reading.log.q, recording.q, atol=1e-6)
-    assert any("leap by whole turns" in each for each in reading.report.warnings)
+    assert any("jump by whole turns" in each for each in reading.report.warnings)
 
 
 def test_positions_that_no_arm_reaches_in_a_step(recording: Recording) -> None:
@@ -289,7 +289,7 @@ def test_positions_that_no_arm_reaches_in_a_step(recording: Recording) -> None:
 def test_accelerations_that_are_none(recording: Recording, factor: float) -> None:
     reading = read_log(csv_of(replace(recording, a=recording.a * factor)), ROBOT)
     assert any(
-        "accelerations of joints 1, 2, 3, 4, 5, 6 are not" in each
+        "accelerations of joints 1, 2, 3, 4, 5, 6 do not fit" in each
         for each in reading.report.warnings
     )
     assert np.abs(reading.log.a - recording.a).std() < 0.1 * recording.a.std()
@@ -304,7 +304,7 @@ def test_efforts_of_one_joint_with_the_other_sign(robot: str) -> None:
     turned = recorded(arm, truth_of(arm), moves=6)
     for joint in range(arm.nq):
         current = turned.current * np.where(np.arange(arm.nq) == joint, -1.0, 1.0)
-        with pytest.raises(EffortNotUsable, match=rf"in i{joint + 1} have the other sign"):
+        with pytest.raises(EffortNotUsable, match=rf"in i{joint + 1} have the opposite sign"):
             read_log(csv_of(with_current(turned, current)), arm)
     assert read_log(csv_of(turned), arm).log.effort_meaning == "current"
 
@@ -312,12 +312,11 @@ def test_efforts_of_one_joint_with_the_other_sign(robot: str) -> None:
 def test_efforts_of_small_joints_that_are_another_joints(recording: Recording) -> None:
     mixed = with_current(recording, recording.current[:, [0, 1, 2, 3, 5, 4]])
     assert any(
-        "not what the motion makes" in each
-        for each in read_log(csv_of(mixed), ROBOT).report.warnings
+        "do not match the motion" in each for each in read_log(csv_of(mixed), ROBOT).report.warnings
     )
     milli = with_current(recording, recording.current * np.array([1, 1, 1, 1, 1, 1000.0]))
     words = " ".join(read_log(csv_of(milli), ROBOT).report.warnings)
-    assert "efforts of joint 6 are beyond 3 times the greatest torque" in words
+    assert "efforts of joint 6 are beyond 3 times the largest torque" in words
 
 
 def test_channels_that_are_written_again_and_again(recording: Recording) -> None:

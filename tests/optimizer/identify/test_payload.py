@@ -104,7 +104,7 @@ def test_the_other_log_may_carry_something_that_is_known() -> None:
 
 def test_a_payload_needs_two_logs_that_differ_by_it() -> None:
     without, loaded = log_of(NOTHING, 0, NOTHING), log_of(PAYLOAD, 0, NOTHING, 50)
-    with pytest.raises(InvalidProblem, match="kg less than the others"):
+    with pytest.raises(InvalidProblem, match="kg less in the last log"):
         found_in(loaded, without)
     with pytest.raises(InvalidProblem, match="two logs"):
         found_in(loaded)

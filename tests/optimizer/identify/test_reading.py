@@ -225,7 +225,7 @@ def test_effort_without_gravity_is_not_usable(recording: Recording) -> None:
 
 def test_effort_of_no_known_meaning_is_not_guessed(recording: Recording) -> None:
     body = csv_of(with_current(recording, 0.3 * recording.torque))
-    with pytest.raises(EffortNotUsable, match=r"not clear.*another order.*payload") as caught:
+    with pytest.raises(EffortNotUsable, match=r"is unclear.*another order.*payload") as caught:
         read_log(body, ROBOT)
     assert caught.value.meaning is None
     assert read_log(body, ROBOT, LogOptions(effort="torque")).log.effort_meaning == "torque"
@@ -236,9 +236,9 @@ def test_a_log_at_rest_goes_by_the_names(recording: Recording) -> None:
     reading = read_log(b"\n".join(lines), ROBOT)
     assert reading.log.effort_meaning == "current"
     assert reading.report.effort is not None and reading.report.effort.confidence == 0
-    assert any("does not tell" in each for each in reading.report.warnings)
+    assert any("does not determine the meaning" in each for each in reading.report.warnings)
     ros = csv_of(recording, "ros").split(b"\n")[:60]
-    with pytest.raises(EffortNotUsable, match="not clear"):
+    with pytest.raises(EffortNotUsable, match="is unclear"):
         read_log(b"\n".join(ros), ROBOT)
 
 
@@ -264,7 +264,7 @@ def test_oddities_are_reported(recording: Recording) -> None:
     reading = read_log("\n".join(broken).encode(), ROBOT)
     assert reading.report.dropped == 1
     words = " ".join(reading.report.warnings)
-    assert "Gaps in the log: 1," in words and "row before: 1." in words and "No payload" in words
+    assert "Gaps in the log: 1," in words and "previous row: 1." in words and "No payload" in words
     # two rests are two parts, separated by the gap
     assert any(
         after.start > before.end
@@ -279,7 +279,7 @@ def test_constant_saturated_and_misfitting_channels(recording: Recording) -> Non
     swapped = csv_of(odd).replace(b"v1,v2", b"v2,v1", 1)
     words = " ".join(read_log(swapped, ROBOT, LogOptions(effort="current")).report.warnings)
     assert "joint 6 are not logged, or never change" in words and "The power never changes" in words
-    assert "stays at its greatest value" in words
+    assert "is clipped at its largest value" in words
     assert "speeds of joints 1, 2 do not fit" in words
 
 
@@ -289,7 +289,7 @@ def test_currents_with_few_digits_are_not_taken_as_cut_off(recording: Recording)
     current[:, 5] = np.round(current[:, 5] / step) * step
     words = " ".join(read_log(csv_of(with_current(recording, current)), ROBOT).report.warnings)
     assert "The effort of joint 6 has fewer than 16 different values" in words
-    assert "stays at its greatest value" not in words
+    assert "is clipped at its largest value" not in words
 
 
 Case = tuple[bytes, str, int | None, str | None]
@@ -311,7 +311,7 @@ def broken_cells(recording: Recording) -> dict[str, Case]:
     return {
         "NaN": (
             with_line(10, b",".join([cells[0], b"nan", *cells[2:]])),
-            "q1 in line 10 is no finite",
+            "q1 in line 10 is not a finite number",
             10,
             "q1",
         ),
@@ -330,7 +330,7 @@ def broken_cells(recording: Recording) -> dict[str, Case]:
         ),
         "infinite": (
             with_line(10, b",".join([*cells[:-1], b"1e400"])),
-            "i6 in line 10 is no finite",
+            "i6 in line 10 is not a finite number",
             10,
             "i6",
         ),
@@ -343,8 +343,8 @@ def broken_tables(recording: Recording) -> dict[str, Case]:
     lines = good.splitlines()
     return {
         "no time": (b"\n".join(line.partition(b",")[2] for line in lines), "no column `t`", 1, "t"),
-        "back": (b"\n".join([*lines[:50], *lines[20:]]), "goes back in line 51", 51, "t"),
-        "all at once": (b"\n".join([lines[0], *[lines[1]] * 200]), "repeats itself", None, "t"),
+        "back": (b"\n".join([*lines[:50], *lines[20:]]), "decreases in line 51", 51, "t"),
+        "all at once": (b"\n".join([lines[0], *[lines[1]] * 200]), "repeats in", None, "t"),
         "one row": (b"\n".join(lines[:2]), "fewer than two rows", None, None),
         "few rows": (b"\n".join(lines[:12]), "it needs 32", None, None),
         "header only": (lines[0], "fewer than two rows", None, None),
@@ -370,7 +370,7 @@ def broken_tables(recording: Recording) -> dict[str, Case]:
         "broken gzip": (gzip.compress(good)[:-200], "broken gzip", None, None),
         "no gzip at all": (b"\x1f\x8b" + bytes(100), "broken gzip", None, None),
         "one long line": (b"t," + b"q" * 40_000, "longer than", 1, None),
-        "a joint's number": (b"t,q" + b"9" * 6000, "no joint positions", 1, None),
+        "a joint's number": (b"t,q" + b"9" * 6000, "no known names of joint positions", 1, None),
         "mostly cut": (
             b"\n".join([*lines[:50], *(line[:40] for line in lines[50:100])]),
             "columns",

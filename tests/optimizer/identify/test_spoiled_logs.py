@@ -141,7 +141,7 @@ def test_radians_that_are_said_to_be_degrees_are_warned_of(recording: Recording)
 def test_causes_of_efforts_that_tell_nothing(recording: Recording) -> None:
     cases = {
         "never change": np.zeros_like(recording.current),
-        "other sign": -recording.current,
+        "opposite sign": -recording.current,
         "another order": recording.current[:, ::-1],
     }
     for words, current in cases.items():

@@ -218,7 +218,7 @@ def test_messages_of_ros(message: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("message", [{}, {"position": fields("xyz", [1.0, 2.0, 3.0])}, 3])
 def test_a_message_without_a_pose_is_refused(message: Any) -> None:
-    with pytest.raises(InvalidProblem, match="has a position and an orientation"):
+    with pytest.raises(InvalidProblem, match="must have a position and an orientation"):
         Pose.from_ros(message)
 
 

@@ -256,7 +256,7 @@ def test_friction_that_grows_with_the_load() -> None:
 
 
 def test_a_motion_of_too_many_steps_is_refused() -> None:
-    with refusal_of("step", match=f"of at most {TIME_GRID.max_steps}"):
+    with refusal_of("step", match=f"but at most {TIME_GRID.max_steps} are possible"):
         replay(quintic(ARM, duration=300.0), step=1e-5)
 
 

@@ -89,7 +89,7 @@ export const asShown = (text: string): string =>
     .replace(/\b[a-z0-9_]+_joint\b/g, jointName)
     .replaceAll("stops/", "stop ")
     .replace("give it in metres, not millimetres, or ", "") // lengths are typed in millimetres
-    .replace(" It looks like degrees: divide it by 57.29578.", "") // joints are typed in degrees
+    .replace(" The value looks like degrees: divide it by 57.29578.", "") // joints are typed in degrees
     .replace(/ is at .* rad: give a value between .* rad/, inDegrees)
     .replace(/(\d+(?:\.\d+)?(?:e-?\d+)?) m\b(?![²³])/g, (whole, metres: string) =>
       Number(metres) < LONGEST ? `${figure(Number(metres) * 1000, 2)} mm` : whole,
