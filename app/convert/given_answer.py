@@ -134,18 +134,28 @@ def to_program(
     raise InvalidProblem("answer", f"{_MOTION}: it has no `trajectory`, `legs` or `samples`.")
 
 
-def arm_of(request: dict[str, Any], answer: dict[str, Any]) -> Arm:
-    """The arm of an answer; of its request, where it is too large to be repeated. Raises
-    InvalidProblem."""
+def arm_of(request: dict[str, Any], answer: dict[str, Any], **instead: Any) -> Arm:
+    """The arm of an answer; of its request, where it is too large to be repeated.
+
+    `instead` replaces some fields. Raises InvalidProblem.
+    """
     known = answer.get("arm")
-    fields = arm_fields_of(request) if known is None else ArmRequest.model_validate(known)
+    fields = arm_fields_of(request if known is None else known, **instead)
     return to_arm(fields.model_copy(update={"robot": answer["robot"]}))
 
 
-def arm_fields_of(request: dict[str, Any]) -> ArmRequest:
-    """The fields of the arm in a request."""
+def arm_at_end(request: dict[str, Any], answer: dict[str, Any], moves: list[Any]) -> Arm:
+    """The arm after the last move of an answer; `moves` are the answers of a cycle's moves."""
+    if (left := answer.get("payload_at_end")) is None:
+        return arm_of(request, (moves or [answer])[-1])
+    return arm_of(request, moves[-1], payload=left)
+
+
+def arm_fields_of(request: dict[str, Any], **instead: Any) -> ArmRequest:
+    """The fields of the arm in a request; `instead` replaces some fields."""
     names = ArmRequest.model_fields
-    return ArmRequest.model_validate({k: value for k, value in request.items() if k in names})
+    given = {k: value for k, value in request.items() if k in names}
+    return ArmRequest.model_validate(given | instead)
 
 
 def paths_of_moves(answer: dict[str, Any]) -> list[str]:
@@ -174,9 +184,8 @@ def _cycle(
         else:
             steps.append(Rest(leg.duration, f"{leg.kind} at {leg.goal.stop}"))
     if found.payload_at_end is not None:
-        last = _Planned.model_validate(answers[-1])
-        own = None if last.arm is None else last.arm | {"payload": found.payload_at_end}
-        steps = with_payload_at_end(steps, _arm(found.robot, own, None).payload)
+        left = arm_of({}, answers[-1], payload=found.payload_at_end).payload
+        steps = with_payload_at_end(steps, left)
     return Program(tuple(steps))
 
 

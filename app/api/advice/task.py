@@ -18,7 +18,7 @@ from joulepath.app.api.advice.variants import (
     over_period,
     variants,
 )
-from joulepath.app.convert.given_answer import arm_of
+from joulepath.app.convert.given_answer import arm_at_end
 from joulepath.app.convert.tool import tool_of_mass
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.request import OptimizeRequest
@@ -131,7 +131,7 @@ def advised(
     """
     total, duration = float(answer["energy"]["electrical"]["total"]), float(answer["duration"])
     waits = 0.0 if period is None or _has_own_wait(task) else max(period - duration, 0.0)
-    waiting = waits * _holding_power(task, (moves or [answer])[-1]) if waits else 0.0
+    waiting = waits * _holding_power(task, answer, moves) if waits else 0.0
     work, found = _Work(end), list[AdvisedChange]()
     now = base = total + waiting
     if changes and task.objective == "electrical":
@@ -154,10 +154,10 @@ def _has_own_wait(task: Task) -> bool:
     return isinstance(task, OptimizeRequest) and task.dwell is not None
 
 
-def _holding_power(task: Task, move: Json) -> float:
-    """Power [W] while the motors hold the arm at the goal of a move."""
-    q = np.array(move["branch"]["goal"]["q"])
-    return float(Plant(arm_of(as_asked(task), move)).holding_power(q))
+def _holding_power(task: Task, answer: Json, moves: list[Json]) -> float:
+    """Power [W] while the motors hold the arm after the last move."""
+    q = np.array((moves or [answer])[-1]["branch"]["goal"]["q"])
+    return float(Plant(arm_at_end(as_asked(task), answer, moves)).holding_power(q))
 
 
 def _rests(task: Task, answer: Json) -> float:

@@ -102,6 +102,16 @@ def test_the_rest_of_the_period_is_waited_after_a_cycle_with_a_time(client: Test
     assert 0 < short == pytest.approx(rest * (long - short) / 2.0)
 
 
+def test_the_wait_after_an_open_cycle_is_without_what_it_put_down(client: TestClient) -> None:
+    place = {"target": {"q": NEAR}, "payload": None, "dwell": 0.5}
+    asked = {"start": {"q": HOME}, "payload": PART, "stops": [place], "closed": False, **PATIENT}
+    kept = client.post("/cycle", json=asked).json()
+    (dwell,) = (leg for leg in kept["legs"] if leg["kind"] == "dwell")
+    found = advised(client, cycle=asked, answer=kept["id"], changes=[], period=6.0)
+    held = found["waiting"] / (6.0 - kept["duration"])
+    assert held == pytest.approx(dwell["electrical"] / dwell["duration"])
+
+
 @pytest.mark.long
 def test_the_way_home_is_needed_where_something_is_carried_there(client: TestClient) -> None:
     stops = [CYCLE["stops"][0], CYCLE["stops"][1] | {"payload": PART}]
