@@ -1,4 +1,4 @@
-# Every target does its own set-up, and needs only make and Python 3.11 or newer.
+# Every target does its own set-up, and needs only make and Python 3.11 to 3.13.
 #   make serve      the service on http://HOST:PORT
 #   make test       every check: lint, types, architecture, tests
 #   make test-long  every check and the long tests: fuzzing, the studio page in a browser, more cases of other tests

@@ -23,7 +23,8 @@ from pathlib import Path
 
 PIP_WHEEL = "pip-26.3-py3-none-any.whl"
 PIP_SHA256 = "f3b60b20ffaadd4415ed7957212a38ac63fa4c5fa375bd0f4a797777940fad13"
-OLDEST_PYTHON = (3, 11)
+OLDEST_PYTHON, TOO_NEW_PYTHON = (3, 11), (3, 14)
+"""The oldest version with all packages, and the first one without: OMPL and EAIK have no wheels."""
 
 
 def pip_setting(name: str) -> str | None:
@@ -104,10 +105,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("environment", type=Path)
     environment: Path = parser.parse_args().environment
-    if sys.version_info < OLDEST_PYTHON:
+    if not OLDEST_PYTHON <= sys.version_info < TOO_NEW_PYTHON:
         print(
-            f"Python {sys.version.split()[0]} is too old: install 3.11 or newer, or name one: make "
-            "PYTHON=python3.11"
+            f"Not all packages exist for Python {sys.version.split()[0]}: install Python 3.11, 3.12 "
+            "or 3.13, and name it, as in: make PYTHON=python3.13",
+            file=sys.stderr,
         )
         return 1
     try:
