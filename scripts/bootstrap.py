@@ -107,8 +107,8 @@ def main() -> int:
     environment: Path = parser.parse_args().environment
     if not OLDEST_PYTHON <= sys.version_info < TOO_NEW_PYTHON:
         print(
-            f"Not all packages exist for Python {sys.version.split()[0]}: install Python 3.11, 3.12 "
-            "or 3.13, and name it, as in: make PYTHON=python3.13",
+            f"Not all packages exist for Python {sys.version.split()[0]}: install Python 3.11, "
+            "3.12 or 3.13, and name it, as in: make PYTHON=python3.13",
             file=sys.stderr,
         )
         return 1
