@@ -7,7 +7,6 @@ from __future__ import annotations
 import json
 
 import pytest
-from fastapi.testclient import TestClient
 from starlette.requests import Request
 
 from joulepath.app.http.weights import is_wanted
@@ -90,13 +89,6 @@ def test_the_head_of_a_stream_ends(server: Server) -> None:
     assert any(EVENTS in line.decode() for line in heads)
 
 
-@pytest.mark.parametrize("path", ["/optimize", "/jobs"])
-def test_a_method_that_a_path_has_not_is_told_so(server: Server, path: str) -> None:
-    method = "PUT" if path == "/jobs" else "GET"
-    answer = asked(server, lines(f"{method} {path} HTTP/1.1", "Host: localhost"))
-    assert answer.status == 405 and "POST" in answer.headers["allow"]
-
-
 def test_http_1_0_has_no_host(server: Server) -> None:
     post = lines("POST /optimize HTTP/1.0", f"Content-Length: {len(WRONG)}") + WRONG
     assert "`sart`" in json.dumps(asked(server, post).problem)
@@ -149,22 +141,3 @@ def test_an_empty_content_type_is_none(server: Server, declared: str) -> None:
 def test_what_a_client_accepts(accept: str, media_type: str, wanted: bool) -> None:
     request = Request({"type": "http", "headers": [(b"accept", accept.encode())]})
     assert is_wanted(request, media_type) == wanted
-
-
-BODY = '{"start": {"q": [0, -1, 1, 0, 1, 0]}, "goal": {"q": [0.1, -1, 1, 0, 1, 0]}}'
-
-
-@pytest.mark.parametrize(
-    "declared", ["application/x-www-form-urlencoded", "application/json", None]
-)
-def test_json_is_taken_however_it_is_declared(client: TestClient, declared: str | None) -> None:
-    headers = {} if declared is None else {"content-type": declared}
-    answer = client.post("/optimize", content=BODY, headers=headers)
-    assert answer.status_code == 200
-    assert answer.json()["branch"]["goal"]["q"][0] == pytest.approx(0.1)
-
-
-def test_a_form_is_refused(client: TestClient) -> None:
-    answer = client.post("/optimize", data={"start": "home", "goal": "away"})
-    assert answer.status_code == 422
-    assert answer.json()["type"] == "/problems/invalid-request"
