@@ -10,7 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from joulepath.optimizer.export.even_points import EvenPoints, even_points, rounded, straight
-from joulepath.optimizer.export.facts import WrittenFile, check_joints, comment, header, output_note
+from joulepath.optimizer.export.facts import (
+    WrittenFile,
+    check_joints,
+    comment,
+    header,
+    output_note,
+    principal_axes,
+)
 from joulepath.optimizer.export.option_ranges import OPTION_RANGES
 from joulepath.optimizer.export.point_options import PointOptions
 from joulepath.optimizer.export.program import Move, Program, Timed
@@ -98,10 +105,13 @@ def _loads(program: Program) -> list[Payload]:
 
 def _tool(number: int, load: Payload) -> str:
     com = ",".join(f"{1000 * x:.3f}" for x in load.com)
+    moments, rotation = principal_axes(load)
+    aom = ",".join(f"{x:.7f}" for x in rotation.as_quat(scalar_first=True))
+    inertia = ",".join(f"{x:.6f}" for x in moments)
     mass = max(load.mass, RAPID.min_tool_mass)
     return (
         "  PERS tooldata "
-        f"jpTool{number}:=[TRUE,[[0,0,0],[1,0,0,0]],[{mass:.4f},[{com}],[1,0,0,0],0,0,0]];"
+        f"jpTool{number}:=[TRUE,[[0,0,0],[1,0,0,0]],[{mass:.4f},[{com}],[{aom}],{inertia}]];"
     )
 
 

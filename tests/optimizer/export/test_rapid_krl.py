@@ -4,14 +4,27 @@ of the spline.
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from joulepath import FormatUnsuitable, KrlOptions, Move, Program, RapidOptions, Rest
+from joulepath import (
+    FormatUnsuitable,
+    KrlOptions,
+    Move,
+    Payload,
+    Program,
+    RapidOptions,
+    Rest,
+)
 from joulepath.optimizer.export.krl import to_krl
 from joulepath.optimizer.export.rapid import to_rapid
 from tests.optimizer.export.programs import LOAD, cycle_with_payload
 from tests.optimizer.export.read_back.point_programs import (
+    NUMBER,
     cut,
     deviation,
     read_krl,
@@ -65,6 +78,28 @@ def test_a_cycle_in_rapid_switches_waits_and_changes_the_load() -> None:
         "jpTool2",
     ]
     assert f"[{LOAD.mass:.4f},[0.000,10.000,60.000]" in file.content.decode()
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_inertia_of_a_payload_is_in_the_load(turned: bool) -> None:
+    """KUKA's angles turn about Z, then Y, then X; ABB's quaternions have the scalar first."""
+    R = Rotation.from_euler("ZYX", [40.0, -25.0, 70.0] if turned else [0.0] * 3, degrees=True)
+    inertia = R.as_matrix() @ np.diag([0.01, 0.02, 0.025]) @ R.as_matrix().T
+    load = Payload(1.5, np.array([0.0, 0.01, 0.06]), (inertia + inertia.T) / 2)
+
+    def numbers(name: str, text: str, start: str) -> list[float]:
+        arm = replace(arm_of(name), payload=load)
+        program = Program((Move(random_spline(arm, 1), arm, "start to goal"),))
+        file = to_krl(program) if name != OWN else to_rapid(program)
+        line = next(each for each in file.content.decode().splitlines() if text in each)
+        return [float(each) for each in re.findall(NUMBER, line.partition(start)[2])]
+
+    *angles, jx, jy, jz = numbers("kr10_r1100", "$LOAD", "A ")
+    axes = Rotation.from_euler("ZYX", angles, degrees=True).as_matrix()
+    assert axes @ np.diag([jx, jy, jz]) @ axes.T == pytest.approx(inertia, abs=1e-5)
+    *quaternion, jx, jy, jz = numbers(OWN, "tooldata", f"{load.mass:.4f},[0.000,10.000,60.000]")
+    axes = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+    assert axes @ np.diag([jx, jy, jz]) @ axes.T == pytest.approx(inertia, abs=1e-5)
 
 
 def test_axes_of_another_sense_and_zero() -> None:

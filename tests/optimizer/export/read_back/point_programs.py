@@ -20,7 +20,8 @@ NUMBER = r"-?\d+\.\d+"
 RAPID = re.compile(
     r"MODULE \w+|ENDMODULE|PROC \w+\(\)|ENDPROC|!.*|PERS tooldata "
     r"(?P<tool>\w+):=\[TRUE,\[\[0,0,0\],\[1,0,0,0\]\],"
-    rf"\[(?P<mass>{NUMBER}),\[(?P<com>[\d.,-]+)\],\[1,0,0,0\],0,0,0\]\];"
+    rf"\[(?P<mass>{NUMBER}),\[(?P<com>[\d.,-]+)\],\[({NUMBER},){{3}}{NUMBER}\],"
+    rf"({NUMBER},){{2}}{NUMBER}\]\];"
     r"|MoveAbsJ "
     rf"\[\[(?P<axes>({NUMBER},){{5}}{NUMBER})\],\[9E9(,9E9){{5}}\]\]\\NoEOffs,"
     rf"v\d+(\\T:=(?P<time>{NUMBER}))?,"
@@ -34,8 +35,8 @@ KRL = re.compile(
     rf"|TIME_BLOCK PART = (?P<part>{NUMBER})|TIME_BLOCK END = (?P<total>{NUMBER})"
     rf"|WAIT SEC (?P<wait>{NUMBER})|\$OUT\[(?P<output>\d+)\]=(?P<value>TRUE|FALSE)"
     rf"|\$LOAD=\{{M (?P<mass>{NUMBER}),"
-    rf"CM \{{X {NUMBER},Y {NUMBER},Z (?P<z>{NUMBER}),A 0.0,B 0.0,C 0.0\}},"
-    rf"J \{{X 0.0,Y 0.0,Z 0.0\}}\}}"
+    rf"CM \{{X {NUMBER},Y {NUMBER},Z {NUMBER},A {NUMBER},B {NUMBER},C {NUMBER}\}},"
+    rf"J \{{X {NUMBER},Y {NUMBER},Z {NUMBER}\}}\}}"
 )
 
 
