@@ -96,6 +96,7 @@ def read(hint: Any, data: Any) -> Any:
     Raises:
         ValueError: the data do not fit the type.
     """
+    hint = _without_alias(hint)
     origin, args = get_origin(hint), get_args(hint)
     if origin is Annotated:
         return read(args[0], data)
@@ -127,6 +128,12 @@ def read(hint: Any, data: Any) -> Any:
     return data
 
 
+def _without_alias(hint: Any) -> Any:
+    """The type behind an alias with arguments, as `NDArray` is from Python 3.12 on."""
+    aliased = getattr(get_origin(hint), "__value__", None)
+    return hint if aliased is None else aliased[get_args(hint)]
+
+
 def _dataclass(hint: Any, data: dict[str, Any]) -> Any:
     name = data.pop(CLASS)
     kind: Any = next((each for each in _with_subclasses(hint) if each.__name__ == name), None)
@@ -145,7 +152,8 @@ def _with_subclasses(kind: type[Any]) -> Iterator[type[Any]]:
 def _option(options: tuple[Any, ...], data: Any) -> Any:
     """Alternative of a union with the form of the data."""
     bare: list[Any] = [
-        get_args(each)[0] if get_origin(each) is Annotated else each for each in options
+        _without_alias(get_args(each)[0] if get_origin(each) is Annotated else each)
+        for each in options
     ]
     if data is None:
         return type(None)
