@@ -226,7 +226,8 @@ def test_simple_cycles_that_are_not_confirmed_are_no_answer() -> None:
         nodes = search.run()
         cycles = simple_cycles(TimedSearch(search, duration), [nodes], fastest=False)
         (alike,) = (each for each in cycles if each.name == "same_factor")
-        assert alike.confirmed is confirmed and (alike.certified() is not None) is confirmed
+        assert alike.unconfirmed is not None and (not alike.unconfirmed) is confirmed
+        assert (alike.certified() is not None) is confirmed
         assert len(cycles) == 1 + confirmed and alike.wait_time == 0
 
 
