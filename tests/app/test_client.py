@@ -45,7 +45,9 @@ def test_it_has_the_functions_of_the_library(service: joulepath.Client) -> None:
     functions = {name for name in public if name.islower()} - own
     assert functions >= {"optimize", "replay", "load_tool"}
     assert {name for name in functions if not hasattr(service, name)} == set()
-    assert service.robot_names() == joulepath.robot_names()
+    # the service also has arms that other tests have stored
+    bundled = joulepath.robot_names()
+    assert tuple(name for name in service.robot_names() if name in bundled) == bundled
     assert service.tool_names() == joulepath.tool_names()
     robot = joulepath.load_robot("ur10e")
     assert service.load_robot("ur10e")["joints"] == list(robot.joint_names)
