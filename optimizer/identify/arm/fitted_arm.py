@@ -19,7 +19,6 @@ from joulepath.optimizer.identify.arm.power_model import (
     TorqueParts,
     bus_power,
     friction_torque,
-    motor_torque,
     power_of_torque,
 )
 from joulepath.optimizer.identify.estimates.estimate import Name
@@ -168,15 +167,7 @@ class FittedArm:
 
     def energy(self, rows: Rows) -> float:
         """Energy [J] of the rows on the bus."""
-        parts = self.torque_parts(rows)
-        power = power_of_torque(
-            self.power_parameters,
-            parts.v,
-            motor_torque(self.power_parameters, parts),
-            self.torque_constant,
-            self.regeneration,
-        )
-        return float(rows.weight @ power)
+        return float(rows.weight @ self.power(rows)[0])
 
 
 def own_arm(robot: Robot, knee: float | None = None) -> FittedArm:

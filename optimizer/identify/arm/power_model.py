@@ -104,26 +104,6 @@ def power_of_torque(
     return np.asarray(np.where(net >= 0, 1.0, regeneration) * net)
 
 
-def motor_torque(figures: PowerParameters, parts: TorqueParts) -> Array:
-    """Motor torque (n, nq) [N·m] of the torque parts, changed by the figures."""
-    rigid = rigid_torque(figures, parts)
-    load = parts.load + figures.load_increment
-    return (
-        parts.other
-        + figures.offset_increment
-        + rigid
-        + figures.rotor_factor * parts.rotor
-        + figures.dry_factor * parts.dry
-        + figures.viscous_factor * parts.viscous
-        + load * np.abs(rigid) * parts.smooth_sign
-    )
-
-
-def rigid_torque(figures: PowerParameters, parts: TorqueParts) -> Array:
-    """Rigid-body torque (n, nq) [N·m] with the masses of the links scaled by the figures."""
-    return parts.rigid + (figures.link_scale - 1) * parts.links
-
-
 def bus_power(
     figures: PowerParameters, parts: TorqueParts, torque_constant: Array, regeneration: float
 ) -> tuple[Array, Array]:
@@ -138,9 +118,18 @@ def bus_power(
     Returns:
         Power (n,) [W], and its derivatives (n, 2 + 7 nq) by the packed figures.
     """
-    rigid, load = rigid_torque(figures, parts), parts.load + figures.load_increment
+    rigid = parts.rigid + (figures.link_scale - 1) * parts.links
+    load = parts.load + figures.load_increment
     loaded = np.abs(rigid) * parts.smooth_sign
-    tau = motor_torque(figures, parts)
+    tau = (
+        parts.other
+        + figures.offset_increment
+        + rigid
+        + figures.rotor_factor * parts.rotor
+        + figures.dry_factor * parts.dry
+        + figures.viscous_factor * parts.viscous
+        + load * loaded
+    )
     i = tau / torque_constant
     net = figures.idle + (tau * parts.v + figures.copper * i**2 + figures.inverter * np.abs(i)).sum(
         axis=1

@@ -79,9 +79,7 @@ class GroupedEquations:
             checkpoint()
             rows = order[edges[k] : edges[k + 1]]
             root = np.sqrt(weight[rows])
-            part = root[:, None] * (
-                np.hstack([block[rows] for block in blocks]) if len(blocks) > 1 else blocks[0][rows]
-            )
+            part = root[:, None] * np.hstack([block[rows] for block in blocks])
             gram[k], moment[k] = part.T @ part, part.T @ (root * values[rows])
         return GroupedEquations(gram, moment)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -28,8 +27,6 @@ class FilterSettings:
     """Smallest ratio of rate to cut-off frequency [1]."""
     order: int = 2
     """Order of the Butterworth filter, applied forwards and backwards."""
-    most_values: int = 1 << 18
-    """Largest number of values that are filtered at once; the filter copies them several times."""
 
 
 FILTERS = FilterSettings()
@@ -43,25 +40,18 @@ def cutoff(rate: float) -> float:
 def low_passed(values: Array, rate: float) -> Array:
     """Channels (n, k) without frequencies above the cut-off and without delay."""
     smooth = np.empty_like(values)
-    for part in _parts(values):
-        smooth[:, part] = filtered(values[:, part], rate, cutoff(rate))
+    # one channel at a time: the filter copies its input
+    for k, channel in enumerate(values.T):
+        smooth[:, k] = filtered(channel, rate, cutoff(rate))
     return smooth
 
 
-def _parts(values: Array) -> Iterator[slice]:
-    """Channels of (n, k) that are filtered at once; at least one."""
-    most = max(FILTERS.most_values // max(len(values), 1), 1)
-    return (slice(k, k + most) for k in range(0, values.shape[1], most))
-
-
-def filtered(values: Array, rate: float, max_frequency: float) -> Array:
-    """Channels (n,) or (n, k) without frequencies above a limit [Hz]: a Butterworth filter, both
-    ways.
-    """
+def filtered(channel: Array, rate: float, max_frequency: float) -> Array:
+    """A channel (n,) without frequencies above a limit [Hz]: a Butterworth filter, both ways."""
     # imported late: only logs are filtered, and every serving process would hold 25 MB of it
     from scipy.signal import sosfiltfilt
 
-    return np.asarray(sosfiltfilt(_sections(rate, max_frequency), values, axis=0))
+    return np.asarray(sosfiltfilt(_sections(rate, max_frequency), channel))
 
 
 @lru_cache
@@ -103,10 +93,10 @@ def _clean_cutoff(channel: Array, rate: float) -> float:
 
 def noise(values: Array, rate: float) -> Array:
     """Robust standard deviation (k,) of the part of channels (n, k) above the cut-off frequency."""
-    return np.concatenate([_noise(values[:, part], rate) for part in _parts(values)])
+    return np.array([_noise(channel, rate) for channel in values.T])
 
 
-def _noise(values: Array, rate: float) -> Array:
-    above = values - low_passed(values, rate)
-    above -= np.median(above, axis=0)
-    return np.asarray(MAD_TO_SD * np.median(np.abs(above), axis=0))
+def _noise(channel: Array, rate: float) -> float:
+    above = channel - low_passed(channel[:, None], rate)[:, 0]
+    above -= np.median(above)
+    return float(MAD_TO_SD * np.median(np.abs(above)))

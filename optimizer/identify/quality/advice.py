@@ -127,7 +127,5 @@ def _shared(covariance: Array, at: IntArray) -> tuple[Array, Array]:
     """
     sd = np.sqrt(np.maximum(covariance[at, at], 0.0))
     at, sd = at[sd > 0], sd[sd > 0]
-    if len(at) == 1:
-        return covariance[:, at] / sd, np.ones((1, 1))
     correlation = covariance[np.ix_(at, at)] / np.outer(sd, sd)
     return covariance[:, at] / sd, np.linalg.pinv(correlation, hermitian=True)
