@@ -5,13 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.spatial.transform import Rotation
-
-from joulepath.models.robot import Array
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.program import Program
-from joulepath.optimizer.problem.arm import Payload
 
 NOT_RUN = (
     "Not tested on hardware: run the file in the simulator of the manufacturer, then slowly, "
@@ -71,17 +66,6 @@ def output_note(program: Program, output: int | str | None) -> tuple[str, ...]:
         "no output is switched where the payload changes: give digital_output, or add the gripper "
         "commands",
     )
-
-
-def principal_axes(load: Payload) -> tuple[Array, Rotation]:
-    """Principal moments (3,) [kg·m²] about the centre of mass of a payload, and the rotation from
-    their axes to the flange frame."""
-    moments = np.diag(load.inertia)
-    if np.array_equal(load.inertia, np.diag(moments)):
-        return moments, Rotation.identity()
-    moments, axes = np.linalg.eigh(load.inertia)
-    axes[:, 0] *= np.linalg.det(axes)
-    return moments, Rotation.from_matrix(axes)
 
 
 def check_joints(program: Program, format: str, nq: int, maker: str, arms: str) -> None:

@@ -12,16 +12,10 @@ from dataclasses import dataclass
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.export.even_points import EvenPoints, even_points, smooth, straight
-from joulepath.optimizer.export.facts import (
-    WrittenFile,
-    check_joints,
-    comment,
-    header,
-    output_note,
-    principal_axes,
-)
+from joulepath.optimizer.export.facts import WrittenFile, check_joints, comment, header, output_note
 from joulepath.optimizer.export.option_ranges import OPTION_RANGES
 from joulepath.optimizer.export.point_options import PointOptions
+from joulepath.optimizer.export.principal_axes import principal_axes
 from joulepath.optimizer.export.program import Move, Program, Timed
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.scalars import check_within
@@ -82,7 +76,8 @@ def to_krl(program: Program, options: KrlOptions | None = None) -> WrittenFile:
 def _load(load: Payload) -> str:
     x, y, z = (1000 * each for each in load.com)
     (jx, jy, jz), rotation = principal_axes(load)
-    a, b, c = rotation.as_euler("ZYX", degrees=True)
+    # at B = ±90°, where only A ± C is determined, C is zero
+    a, b, c = rotation.as_euler("ZYX", degrees=True, suppress_warnings=True)
     return (
         f"$LOAD={{M {load.mass:.4f},CM {{X {x:.3f},Y {y:.3f},Z {z:.3f},A {a:.3f},B {b:.3f},"
         f"C {c:.3f}}},J {{X {jx:.6f},Y {jy:.6f},Z {jz:.6f}}}}}"

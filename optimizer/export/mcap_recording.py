@@ -23,11 +23,10 @@ from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.export.facts import WrittenFile
 from joulepath.optimizer.export.markers import Fields, markers, pose
 from joulepath.optimizer.export.option_ranges import OPTION_RANGES
-from joulepath.optimizer.export.program import Move, Program, Rest, Timed
+from joulepath.optimizer.export.program import Move, Program
 from joulepath.optimizer.export.quintic_points import NANOSECONDS, quintic_points
 from joulepath.optimizer.export.ros_messages import joint_trajectory
 from joulepath.optimizer.export.rows import check_period, times
-from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.scalars import check_text
 
 STRING = "std_msgs/msg/String"
@@ -141,19 +140,9 @@ def _rows(
             )
         else:
             q, v, a = program.at(inside)
-            tau = Plant(_resting(program, each)).motor_torques(q, v, a)
+            arm = replace(program.moves[-1].arm, payload=each.carried)
+            tau = Plant(arm).motor_torques(q, v, a)
             yield from zip(inside.tolist(), q, v, tau, repeat(None))
-
-
-def _resting(program: Program, rest: Timed) -> Arm:
-    """The arm of a rest: that of the move after it, whose payload it already has, or before it,
-    with the payload that it has at the end."""
-    after = (each.step for each in program.timed if each.t0 > rest.t0)
-    moves = (each for each in after if isinstance(each, Move))
-    arm, last = program.moves[-1].arm, program.steps[-1]
-    if isinstance(last, Rest) and last.payload is not None:
-        arm = replace(arm, payload=last.payload)
-    return next((move.arm for move in moves), arm)
 
 
 def _transforms(T: Array, frames: list[str], t: float) -> list[Fields]:

@@ -57,6 +57,8 @@ class Timed:
     step: Move | Rest
     t0: float
     """Start of the step [s]."""
+    carried: Payload
+    """Payload during the step."""
     payload: Payload | None = None
     """Payload that the arm has from the start of the step on; None if it does not change."""
     grasps: bool = False
@@ -138,7 +140,7 @@ class Program:
             )
             payload = None if _same(held, carried) else held
             timed.append(
-                Timed(step, t, payload, payload is not None and payload.mass > carried.mass)
+                Timed(step, t, held, payload, payload is not None and payload.mass > carried.mass)
             )
             carried, t = held, t + step.duration
         return tuple(timed)

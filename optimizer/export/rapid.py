@@ -10,16 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from joulepath.optimizer.export.even_points import EvenPoints, even_points, rounded, straight
-from joulepath.optimizer.export.facts import (
-    WrittenFile,
-    check_joints,
-    comment,
-    header,
-    output_note,
-    principal_axes,
-)
+from joulepath.optimizer.export.facts import WrittenFile, check_joints, comment, header, output_note
 from joulepath.optimizer.export.option_ranges import OPTION_RANGES
 from joulepath.optimizer.export.point_options import PointOptions
+from joulepath.optimizer.export.principal_axes import principal_axes
 from joulepath.optimizer.export.program import Move, Program, Timed
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.scalars import check_text

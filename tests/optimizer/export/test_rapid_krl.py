@@ -80,11 +80,20 @@ def test_a_cycle_in_rapid_switches_waits_and_changes_the_load() -> None:
     assert f"[{LOAD.mass:.4f},[0.000,10.000,60.000]" in file.content.decode()
 
 
-@pytest.mark.parametrize("turned", [False, True])
-def test_the_inertia_of_a_payload_is_in_the_load(turned: bool) -> None:
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("turned", "moments"),
+    [
+        pytest.param([0.0, 0.0, 0.0], [0.01, 0.02, 0.025], id="along the flange"),
+        pytest.param([40.0, -25.0, 70.0], [0.01, 0.02, 0.025], id="about three axes"),
+        pytest.param([40.0, 0.0, 0.0], [0.025, 0.02, 0.01], id="B is 90 degrees"),
+        pytest.param([40.0, -25.0, 70.0], [0.02, 0.0, 0.02], id="a rod"),
+    ],
+)
+def test_the_inertia_of_a_payload_is_in_the_load(turned: list[float], moments: list[float]) -> None:
     """KUKA's angles turn about Z, then Y, then X; ABB's quaternions have the scalar first."""
-    R = Rotation.from_euler("ZYX", [40.0, -25.0, 70.0] if turned else [0.0] * 3, degrees=True)
-    inertia = R.as_matrix() @ np.diag([0.01, 0.02, 0.025]) @ R.as_matrix().T
+    R = Rotation.from_euler("ZYX", turned, degrees=True).as_matrix()
+    inertia = R @ np.diag(moments) @ R.T
     load = Payload(1.5, np.array([0.0, 0.01, 0.06]), (inertia + inertia.T) / 2)
 
     def numbers(name: str, text: str, start: str) -> list[float]:
@@ -97,9 +106,10 @@ def test_the_inertia_of_a_payload_is_in_the_load(turned: bool) -> None:
     *angles, jx, jy, jz = numbers("kr10_r1100", "$LOAD", "A ")
     axes = Rotation.from_euler("ZYX", angles, degrees=True).as_matrix()
     assert axes @ np.diag([jx, jy, jz]) @ axes.T == pytest.approx(inertia, abs=1e-5)
-    *quaternion, jx, jy, jz = numbers(OWN, "tooldata", f"{load.mass:.4f},[0.000,10.000,60.000]")
+    *quaternion, ix, iy, iz = numbers(OWN, "tooldata", f"{load.mass:.4f},[0.000,10.000,60.000]")
     axes = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
-    assert axes @ np.diag([jx, jy, jz]) @ axes.T == pytest.approx(inertia, abs=1e-5)
+    assert axes @ np.diag([ix, iy, iz]) @ axes.T == pytest.approx(inertia, abs=1e-5)
+    assert min(np.copysign(1.0, [jx, jy, jz, ix, iy, iz])) > 0
 
 
 def test_axes_of_another_sense_and_zero() -> None:
