@@ -1,8 +1,7 @@
-"""Operations on jobs: create, cancel, retry, delete and wait."""
+"""Operations on jobs: create, cancel, retry and delete."""
 
 from __future__ import annotations
 
-import asyncio
 from dataclasses import dataclass
 from functools import partial
 
@@ -12,9 +11,6 @@ from joulepath.app.settings import Settings
 from joulepath.app.store import jobs
 from joulepath.app.store.jobs import JobView, NewJob
 from joulepath.app.store.store import Store
-
-LOOK = 1.0
-"""Time [s] between two queries for the work of other services."""
 
 
 @dataclass(frozen=True)
@@ -62,22 +58,6 @@ class Jobs:
         """
         await self.store.write(partial(jobs.delete, job_id=job_id, client=client), frees=True)
         self._has_changed(job_id, stop=True)
-
-    async def ended(self, job_id: str, longest: float) -> JobView:
-        """A job after its end, or as it is after a time [s]. Raises UnknownJob or
-        StoreUnavailable."""
-        clock = asyncio.get_running_loop().time
-        end, changes = clock() + longest, self.dispatcher.changes
-        bell = changes.listen(job_id)
-        try:
-            while True:
-                view = await self.view(job_id)
-                left = end - clock()
-                if view.job.ended is not None or left <= 0 or self.dispatcher.draining:
-                    return view
-                await changes.wait(bell, min(left, LOOK))
-        finally:
-            changes.leave(job_id, bell)
 
     def _has_changed(self, job_id: str, stop: bool = False) -> None:
         if stop:

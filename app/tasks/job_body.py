@@ -16,11 +16,10 @@ from joulepath.app.exceptions.base import FieldError, InvalidRequest
 from joulepath.app.http.problems import MOST_ERRORS, invalid_request
 from joulepath.app.schemas.common import Request
 from joulepath.app.schemas.deadline import given_deadline, too_long
-from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.jobs import KINDS
 from joulepath.app.schemas.jobs import NewJob as JobModel
+from joulepath.app.settings import Settings
 from joulepath.app.store.jobs import NewJob, NewRequest
-from joulepath.app.tasks.read_body import HeldBody
 from joulepath.app.tasks.request_key import meaning_of
 
 
@@ -31,6 +30,12 @@ class Deadlines:
     longest: float
     without: float
 
+    @classmethod
+    def of(cls, settings: Settings) -> Deadlines:
+        """The deadlines of a service."""
+        longest = settings.max_job_deadline
+        return cls(longest, min(settings.max_deadline, longest))
+
 
 @dataclass(frozen=True)
 class Validated(TaskResult):
@@ -38,67 +43,33 @@ class Validated(TaskResult):
 
     job: NewJob = field(kw_only=True)
 
-    @classmethod
-    def of(cls, job: NewJob) -> Validated:
-        """The result with this job."""
-        return cls(b"", "application/json", job=job)
-
 
 @dataclass(frozen=True)
 class JobBodyTask:
-    """The JSON body of `POST /jobs` in `file`; with `evaluate`, the body of `POST /evaluate` as a
-    job of its own.
-
-    `fresh`: the answers of equal requests do not do.
-    """
+    """The JSON body of `POST /jobs` in `file`; `fresh`: the answers of equal requests do not do."""
 
     file: str
     deadlines: Deadlines
     request_id: str
     fresh: bool
-    evaluate: bool = False
 
     def run(self, deadline: float) -> TaskResult:
         """The job. Raises InvalidRequest."""
         content = parsed_json(Path(self.file).read_bytes())
         try:
-            if self.evaluate:
-                return Validated.of(
-                    job_of_one(
-                        "evaluate",
-                        EvaluateRequest.model_validate(content),
-                        self.deadlines,
-                        self.fresh,
-                    )
-                )
             asked = JobModel.model_validate(content)
         except ValidationError as error:
             raise invalid_request(error, "body") from None
-        return Validated.of(_job(asked, self.deadlines, self.fresh))
+        job = _job(asked, self.deadlines, self.fresh)
+        return Validated(b"", "application/json", job=job)
 
 
-@dataclass(frozen=True)
-class JobOfOneTask:
-    """A validated request to the endpoint `kind`, too large for the service's own process."""
-
-    kind: str
-    asked: Request | HeldBody
-    deadlines: Deadlines
-    request_id: str
-    fresh: bool
-
-    def run(self, deadline: float) -> TaskResult:
-        """The job. Raises InvalidRequest."""
-        assert not isinstance(self.asked, HeldBody), "in a worker it is the model itself"
-        return Validated.of(job_of_one(self.kind, self.asked, self.deadlines, self.fresh))
-
-
-def job_of_one(kind: str, asked: Request, deadlines: Deadlines, fresh: bool) -> NewJob:
-    """A validated request as a job; `fresh`: the answer of an equal one does not do. Raises
+def job_of_one(kind: str, asked: Request, deadlines: Deadlines) -> NewJob:
+    """A validated request as a job, for which the answer of an equal one does not do. Raises
     InvalidRequest if its deadline is too long."""
     if wrong := too_long(given_deadline(asked), deadlines.longest, "body"):
         raise InvalidRequest(wrong)
-    requests = [_new_request(kind, asked, deadlines, fresh)]
+    requests = [_new_request(kind, asked, deadlines, fresh=True)]
     return NewJob(requests, _fingerprint(requests, "one"))
 
 

@@ -9,12 +9,10 @@ from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.task import CycleAnswer, CycleTask
 from joulepath.app.api.shared.dependencies import ServiceCache
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
-from joulepath.app.api.shared.later import ACCEPTED, ServiceLater
 from joulepath.app.api.shared.parameters import WantedFormat
 from joulepath.app.api.shared.problem_lists import CYCLE_PROBLEMS
 from joulepath.app.api.shared.reply import BY_EVENTS, ServiceTasks
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions.stored import KeyReused
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.tasks.read_body import HeldBody
 from joulepath.app.tasks.request_key import cell_of
@@ -29,15 +27,13 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     response_model=model_of(CycleAnswer),
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}}, **BY_EVENTS}},
-        **ACCEPTED,
-        **problem_responses(*CYCLE_PROBLEMS, KeyReused),
+        **problem_responses(*CYCLE_PROBLEMS),
     },
 )
 async def cycle(
     body: CycleRequest,
     wanted: WantedFormat,
     tasks: ServiceTasks,
-    later: ServiceLater,
     cache: ServiceCache,
 ) -> Response:
     """Finds the arm configurations at all stops of a cycle, and the motions between them, with the
@@ -45,8 +41,6 @@ async def cycle(
     that all are chosen together. A move refers to its complete answer. `Accept:
     text/csv` returns the samples of the cycle, `Accept: text/event-stream` events while the search
     runs, and then the answer."""
-    if later.wanted:
-        return await later.respond("cycle", body)
     # a body above 64 KiB is not looked into here
     cell = None if isinstance(body, HeldBody) else cell_of(body)
 

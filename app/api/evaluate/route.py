@@ -8,19 +8,17 @@ from fastapi import APIRouter, Request, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.evaluate.task import EvaluateAnswer, EvaluateTask
-from joulepath.app.api.shared.later import ACCEPTED, ServiceLater, deadlines
-from joulepath.app.api.shared.parameters import WantedFormat, is_fresh
+from joulepath.app.api.shared.parameters import WantedFormat
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.api.shared.query_settings import query_parameters
 from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.api.shared.uploads import received
 from joulepath.app.exceptions.base import InvalidRequest
-from joulepath.app.exceptions.stored import KeyReused, UnknownFigures, UnknownLog
+from joulepath.app.exceptions.stored import UnknownFigures, UnknownLog
 from joulepath.app.exceptions.transport import UnsupportedMediaType, UploadNotStored
 from joulepath.app.http.json_route import UNDECLARED, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
-from joulepath.app.tasks.job_body import JobBodyTask
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.identify.errors import LogTooLarge
 
@@ -66,7 +64,6 @@ def _kind_of(file: IO[bytes]) -> _Kind:
     response_model=model_of(EvaluateAnswer),
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": _TABLE}}},
-        **ACCEPTED,
         **problem_responses(
             *WORKER_PROBLEMS,
             UnknownFigures,
@@ -75,7 +72,6 @@ def _kind_of(file: IO[bytes]) -> _Kind:
             LogTooLarge,
             UnsupportedMediaType,
             UploadNotStored,
-            KeyReused,
         ),
     },
     openapi_extra=_openapi(),
@@ -84,7 +80,6 @@ async def evaluate(
     request: Request,
     wanted: WantedFormat,
     tasks: ServiceTasks,
-    later: ServiceLater,
 ) -> Response:
     """The energy of a given motion, per segment and in total, and its violated limits. The motion
     is a list of configurations with times, a trajectory, or a log of the arm, with measured
@@ -99,10 +94,6 @@ async def evaluate(
         kind = kind or _kind_of(file)
         if kind == "json" and request.query_params:
             raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
-        if later.wanted and kind == "json":
-            longest = deadlines(tasks.settings)
-            body = JobBodyTask(path, longest, tasks.request_id, is_fresh(request), evaluate=True)
-            return await later.respond_with(await later.validated(body))
         query, deadline = dict(request.query_params), tasks.deadline()
         task = EvaluateTask(path, kind, query, wanted, tasks.request_id, deadline)
         return await tasks.answer(task)

@@ -20,7 +20,6 @@ from joulepath.app.api.identifications.models import (
 )
 from joulepath.app.api.identifications.request import IdentifyRequest
 from joulepath.app.api.shared.dependencies import ServiceClient, ServiceJobs, ServiceStore
-from joulepath.app.api.shared.later import deadlines
 from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, set_location
 from joulepath.app.convert.packed import unpacked
 from joulepath.app.engine.result import TaskResult
@@ -43,7 +42,7 @@ from joulepath.app.store import answers
 from joulepath.app.store import jobs as stored_jobs
 from joulepath.app.store import logs as stored_logs
 from joulepath.app.store.tables import Figures, Job, JobRequest
-from joulepath.app.tasks.job_body import job_of_one
+from joulepath.app.tasks.job_body import Deadlines, job_of_one
 from joulepath.app.tasks.job_request import IDENTIFY, RESIDUALS
 
 router = APIRouter(prefix="/identifications", tags=["logs"], route_class=JsonRoute)
@@ -86,7 +85,7 @@ async def add(
         robots.add((await store.read(partial(stored_logs.about, log_id=each))).robot)
     if len(robots) > 1:
         raise InvalidRequest([{"loc": ["body", "logs"], "msg": "All logs must be of one robot."}])
-    new = job_of_one(IDENTIFY, body, deadlines(jobs.settings), fresh=True)
+    new = job_of_one(IDENTIFY, body, Deadlines.of(jobs.settings))
     job_id, again = await jobs.create(new, key, client.owner)
     set_location(request, response, f"/identifications/{job_id}", again)
     return await _shown(store, job_id)

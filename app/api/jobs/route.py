@@ -9,7 +9,6 @@ from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
 from joulepath.app.api.shared.dependencies import ServiceClient, ServiceJobs, ServiceStore
-from joulepath.app.api.shared.later import deadlines
 from joulepath.app.api.shared.parameters import (
     CREATED_HEADERS,
     Key,
@@ -44,7 +43,7 @@ from joulepath.app.schemas.examples.values import JOB_ID, RESULTS_CSV, RESULTS_L
 from joulepath.app.schemas.jobs import Job, JobDetail, JobList, JobPage, NewJob, RequestPage
 from joulepath.app.schemas.queries import NewName
 from joulepath.app.store import jobs as stored_jobs
-from joulepath.app.tasks.job_body import JobBodyTask, Validated
+from joulepath.app.tasks.job_body import Deadlines, JobBodyTask, Validated
 from joulepath.app.tasks.job_request import IDENTIFY
 from joulepath.optimizer.exceptions import DeadlineExceeded
 
@@ -106,7 +105,7 @@ async def create(
     if media_type(request.headers) not in (JSON, *UNDECLARED):
         raise UnsupportedMediaType
     async with received(request) as (_, path):
-        task = JobBodyTask(path, deadlines(tasks.settings), tasks.request_id, is_fresh(request))
+        task = JobBodyTask(path, Deadlines.of(tasks.settings), tasks.request_id, is_fresh(request))
         result = await tasks.result(task)
     assert isinstance(result, Validated)
     job_id, again = await jobs.create(result.job, key, tasks.client.owner)

@@ -8,10 +8,9 @@ from joulepath.app.answers.declared import model_of
 from joulepath.app.api.placement.request import PlacementRequest
 from joulepath.app.api.placement.task import PlacementAnswer, PlacementTask
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
-from joulepath.app.api.shared.later import ACCEPTED, ServiceLater
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.api.shared.reply import BY_EVENTS, ServiceTasks
-from joulepath.app.exceptions.stored import KeyReused, UnknownFigures
+from joulepath.app.exceptions.stored import UnknownFigures
 from joulepath.app.http.openapi import problem_responses
 from joulepath.optimizer.exceptions import ContradictoryOrder, OutsideLimits
 from joulepath.optimizer.placement.errors import NoPlacement
@@ -25,22 +24,18 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     response_model=model_of(PlacementAnswer),
     responses={
         200: {"content": BY_EVENTS},
-        **ACCEPTED,
         **problem_responses(
             *WORKER_PROBLEMS,
             UnknownFigures,
             OutsideLimits,
             ContradictoryOrder,
             NoPlacement,
-            KeyReused,
         ),
     },
 )
-async def placement(body: PlacementRequest, tasks: ServiceTasks, later: ServiceLater) -> Response:
+async def placement(body: PlacementRequest, tasks: ServiceTasks) -> Response:
     """Finds the place of the robot, or of stops and obstacles around it, with the least energy of
     given cycles. The answer has the best and the nominal place with their complete cycles, and a
     map of the region with the energy of every place, or the reason why the cycles fail there.
     `Accept: text/event-stream` returns events while the search runs, and then the answer."""
-    if later.wanted:
-        return await later.respond("placement", body)
     return await tasks.search("placement", PlacementTask(body, tasks.request_id), body)

@@ -1,4 +1,4 @@
-"""Jobs over HTTP: their life, their results, refusals, `Prefer: respond-async`."""
+"""Jobs over HTTP: their life, their results, refusals."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.exceptions.queue import Busy
 from joulepath.app.exceptions.stored import JobNotCancellable, KeyReused, UnknownAnswer, UnknownJob
 from joulepath.app.exceptions.transport import BodyTooLarge
-from joulepath.app.schemas.jobs import Job, JobList
-from tests.app.job_clients import ended, evaluation, optimization, parsed, sent, shown
+from joulepath.app.schemas.jobs import JobList
+from tests.app.job_clients import ended, evaluation, optimization, parsed, sent
 from tests.app.problems import checked
 from tests.app.recorded import recorded_service
 from tests.app.requests import HOME, NEAR, move
@@ -25,7 +25,6 @@ from tests.app.routes.test_problems import refused
 
 ABSENT = "/jobs/5c0a0e0f-8d1f-4f1c-9a43-2f4a3ad0d1b7"
 TOO_SHORT = {"optimize": move(duration=0.01)}
-LATER = {"Prefer": "respond-async"}
 
 
 @pytest.fixture(scope="module")
@@ -217,10 +216,6 @@ def test_a_key_makes_one_job(recorded: TestClient) -> None:
         refused(
             recorded.post("/jobs", json=other, headers={"Idempotency-Key": "jobs-1"}), KeyReused
         )
-    refused(
-        recorded.post("/optimize", json=move(), headers=LATER | {"Idempotency-Key": "jobs-1"}),
-        KeyReused,
-    )
 
 
 def test_an_ended_job_is_retried_or_deleted_but_not_cancelled(client: TestClient) -> None:
@@ -239,72 +234,18 @@ def test_an_ended_job_is_retried_or_deleted_but_not_cancelled(client: TestClient
     refused(client.get(before["requests"][0]["answer"]), UnknownAnswer)
 
 
-POSTS: dict[str, Any] = {
-    "/optimize": move(),
-    "/compare": move(methods=["time_scaling"]),
-    "/pareto": move(points=2, method="time_scaling"),
-    "/cycle": {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], "windings": False},
-    "/whatif": {
-        "evaluate": evaluation()["evaluate"],
-        "changes": [{"name": "x", "arm": {"link_mass_scale": 0.5}}],
-    },
-    "/evaluate": evaluation()["evaluate"],
-}
-
-
-@pytest.mark.parametrize("path", POSTS)
-def test_any_request_may_become_a_job(path: str, recorded: TestClient) -> None:
-    answer = recorded.post(path, json=POSTS[path], headers=LATER)
-    assert answer.status_code == 202, answer.text
-    Job.model_validate_json(answer.content)
-    assert answer.headers["preference-applied"] == "respond-async"
-    (only,) = ended(recorded, answer.headers["location"])["requests"]
-    assert (only["kind"], only["state"]) == (path[1:], "done")
-
-
-def test_a_client_may_wait_for_the_answer_of_its_job(client: TestClient) -> None:
-    waiting = {"Prefer": 'foo; bar="x", Respond-Async, wait=100'}
-    answer = client.post("/optimize", json=move(), headers=waiting)
-    assert (answer.status_code, answer.headers["preference-applied"]) == (200, "wait=100")
-    model_of(OptimizeAnswer).model_validate_json(answer.content)
-    job = shown(client, answer.headers["location"])
-    assert client.get(job["requests"][0]["answer"]).json()["answer"] == answer.json()
-    answer = client.post("/optimize", json=TOO_SHORT["optimize"], headers=waiting)
-    refused(answer, DurationTooShort)
-    assert answer.headers["preference-applied"] == "wait=100"
-
-
-@pytest.mark.parametrize("prefer", ["wait=5", "respond-asynchronously", "", "respond-async=1"])
-def test_other_preferences_have_no_effect(prefer: str, recorded: TestClient) -> None:
-    answer = recorded.post("/evaluate", json=evaluation()["evaluate"], headers={"Prefer": prefer})
-    assert answer.status_code == 200
-    assert "preference-applied" not in answer.headers
-
-
-@pytest.mark.parametrize("headers", [{}, LATER])
-def test_settings_beside_a_json_body_are_refused(
-    headers: dict[str, str], recorded: TestClient
-) -> None:
+def test_settings_beside_a_json_body_are_refused(recorded: TestClient) -> None:
     """Such settings would have no effect."""
     body, query = evaluation()["evaluate"], {"drives": '{"inverter": {"constant": 1.0}}'}
-    answer = recorded.post("/evaluate", json=body, params=query, headers=headers)
+    answer = recorded.post("/evaluate", json=body, params=query)
     (error,) = refused(answer, InvalidRequest)["errors"]
     assert error["loc"] == ["query"] and "JSON body" in error["msg"]
-
-
-def test_a_table_is_evaluated_at_once(recorded: TestClient) -> None:
-    table = "q1,q2,q3,q4,q5,q6\n0,-1.57,1.57,-1.57,-1.57,0\n0.3,-1.4,1.4,-1.5,-1.57,0.2\n"
-    headers = LATER | {"Content-Type": "text/csv"}
-    answer = recorded.post(
-        "/evaluate", params={"time_per_segment": "1.5"}, content=table, headers=headers
-    )
-    assert (answer.status_code, "preference-applied" in answer.headers) == (200, False)
 
 
 def test_a_job_may_have_a_longer_deadline(recorded: TestClient) -> None:
     longer = move(deadline=300.0)
     refused(recorded.post("/optimize", json=longer), InvalidRequest)
-    path = recorded.post("/optimize", json=longer, headers=LATER).headers["location"]
+    path = sent(recorded, [{"optimize": longer}])
     assert ended(recorded, path)["counts"]["done"] == 1
 
 
@@ -320,5 +261,3 @@ def test_limits_of_the_service() -> None:
             "loc": ["body", "requests", 1, "optimize", "deadline"],
             "msg": "Give a number of at most 5: no longer deadline is allowed here.",
         }
-        answer = small.post("/optimize", json=move(deadline=6.0), headers=LATER)
-        assert refused(answer, InvalidRequest)["errors"][0]["loc"] == ["body", "deadline"]
