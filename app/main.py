@@ -52,7 +52,6 @@ from joulepath.app.jobs.executor import ClusterExecutor, Executor, LocalExecutor
 from joulepath.app.jobs.jobs import Jobs
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
-from joulepath.app.tasks.answer_cache import InFlight
 
 ROUTES = (
     optimize,
@@ -112,7 +111,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.settings = settings
     app.state.metrics = Metrics()
     app.state.bodies = Bodies(settings)
-    app.state.in_flight = InFlight()
     keys = key_ring(settings)
     _add_middleware(app, settings, keys)
     install_handlers(app)

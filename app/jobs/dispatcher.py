@@ -13,10 +13,10 @@ from joulepath.app.engine.task import Ended
 from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.jobs.changes import Changes
-from joulepath.app.jobs.equals import Equals, Sorted
 from joulepath.app.jobs.executor import Executor
 from joulepath.app.jobs.heap import Heap, Held, Taker
 from joulepath.app.jobs.holder import is_gone, new_holder
+from joulepath.app.jobs.known_answers import Sorted, sort
 from joulepath.app.jobs.progress import Found
 from joulepath.app.jobs.work import defect, outcome_of
 from joulepath.app.settings import Settings
@@ -43,8 +43,6 @@ class DispatcherSettings:
     """Most requests leased ahead per worker."""
     gather: float = 0.05
     """Time [s] of collecting outcomes for one transaction while workers have more to do."""
-    most_equal: int = 500
-    """Most requests leased beyond `most_ahead` while they wait for equal requests."""
     most_known: int = 64
     """Most requests leased beyond `most_ahead` if all earlier ones had known answers."""
     stop: float = 3.0
@@ -88,7 +86,6 @@ class Dispatcher:
         self._store, self._executor, self._settings, self._now = store, executor, settings, now
         self._held: dict[Key, Held] = {}
         self._heap = Heap()
-        self._equals = Equals(store)
         self._outcomes: list[Outcome] = []
         self._bell = asyncio.Event()
         self._times = _Times(now())
@@ -187,8 +184,6 @@ class Dispatcher:
         if self._held.get(held.lease.key) is held:
             del self._held[held.lease.key]
         self._bell.set()
-        for other, same in self._equals.ended(held, outcome):
-            self._has_outcome(other, same)
 
     async def _dispatch(self) -> None:
         """Exchanges leases and outcomes with the database."""
@@ -215,13 +210,7 @@ class Dispatcher:
         # One task dispatches; tasks beyond the slots find nothing to do.
         more = self._executor.slots + 1 - len(self._tasks)
         self._tasks += [asyncio.create_task(self._run()) for _ in range(more)]
-        await self._begin(self._equals.released())
-        want = (
-            self._most_held
-            + min(self._equals.waiting, DISPATCHER.most_equal)
-            + self._more_known
-            - len(self._held)
-        )
+        want = self._most_held + self._more_known - len(self._held)
         if want <= 0 or not self._executor.slots or self._draining:
             return
         now = self._now()
@@ -248,13 +237,13 @@ class Dispatcher:
                 self._more_known = min(max(1, 2 * self._more_known), DISPATCHER.most_known)
 
     async def _begin(self, held: list[Held]) -> int:
-        """Starts requests without equal ones, and returns their number."""
+        """Starts requests without a known answer, and returns their number."""
         wanted = [each for each in held if not each.dropped]
         for each in held:
             if each.dropped:
                 self._give_back(each)
         try:
-            found = await self._equals.sort(wanted)
+            found = await sort(self._store, wanted)
         except Exception as error:
             if not isinstance(error, StoreUnavailable):
                 logger.exception("unforeseen error")

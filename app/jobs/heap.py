@@ -24,8 +24,8 @@ SMALL = 1 << 12
 class Held:
     """A lease and the work on it.
 
-    `began` [s] is its start by `perf_counter`. `dropped`: the request is no longer wanted. `leads`:
-    equal requests may wait for it. `motions` are known motions of the cell of a cycle.
+    `began` [s] is its start by `perf_counter`. `dropped`: the request is no longer wanted.
+    `motions` are known motions of the cell of a cycle.
     """
 
     lease: Lease
@@ -35,7 +35,6 @@ class Held:
     dropped: bool = False
     asked: Asked | None = None
     motions: Mapping[str, bytes] = field(default_factory=dict)
-    leads: bool = False
 
     def drop(self) -> None:
         """Stops the work on it."""

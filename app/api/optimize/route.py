@@ -14,7 +14,7 @@ from joulepath.app.api.shared.reply import BY_EVENTS, ServiceTasks
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.optimizer.progress import Tell, no_listener
+from joulepath.optimizer.progress import Tell
 from joulepath.optimizer.search.errors import PathInfeasible
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
@@ -40,11 +40,9 @@ async def optimize(body: OptimizeRequest, tasks: ServiceTasks, cache: ServiceCac
     async def work(tell: Tell) -> TaskResult:
         deadline = tasks.deadline(body)
         asked = await cache.asked("optimize", body, deadline)
-
-        async def compute(left: float) -> TaskResult:
-            return await tasks.kept("optimize", await tasks.engine.run(task, left, tell), asked)
-
-        is_heard = tell is not no_listener
-        return await cache.answer(asked, tasks.request_id, deadline, compute, is_heard)
+        known = await cache.find(asked, tasks.request_id)
+        if known is not None:
+            return known
+        return await tasks.kept("optimize", await tasks.engine.run(task, deadline, tell), asked)
 
     return await tasks.respond(work)

@@ -18,7 +18,7 @@ from joulepath.app.http.metrics import Metrics
 from joulepath.app.jobs.jobs import Jobs
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
-from joulepath.app.tasks.answer_cache import AnswerCache, InFlight
+from joulepath.app.tasks.answer_cache import AnswerCache
 from joulepath.app.tasks.arm_engine import ArmEngine
 
 # coroutines, because FastAPI would run plain functions in a thread
@@ -46,7 +46,6 @@ ServiceSettings = Annotated[Settings, _of_app("settings")]
 ServiceMetrics = Annotated[Metrics, _of_app("metrics")]
 ServiceEngine = Annotated[Engine, _of_app("engine")]
 ServiceStore = Annotated[Store, _of_app("store")]
-ServiceInFlight = Annotated[InFlight, _of_app("in_flight")]
 
 
 async def _client_engine(engine: ServiceEngine, client: ServiceClient) -> ClientEngine:
@@ -61,10 +60,8 @@ async def _arm_engine(engine: ServiceClientEngine, store: ServiceStore) -> ArmEn
     return ArmEngine(engine, store)
 
 
-async def _cache(
-    request: Request, store: ServiceStore, client: ServiceClient, in_flight: ServiceInFlight
-) -> AnswerCache:
-    return AnswerCache(store, client.owner, is_fresh(request), in_flight)
+async def _cache(request: Request, store: ServiceStore, client: ServiceClient) -> AnswerCache:
+    return AnswerCache(store, client.owner, is_fresh(request))
 
 
 ServiceCache = Annotated[AnswerCache, Depends(_cache)]

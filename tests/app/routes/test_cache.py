@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import keep_answer
 from joulepath.app.store.tables import CachedAnswer
 from joulepath.app.tasks import answer_cache, request_key
-from joulepath.app.tasks.answer_cache import AnswerCache, InFlight
+from joulepath.app.tasks.answer_cache import AnswerCache
 from joulepath.app.tasks.answer_collector import figures_of
 from joulepath.app.tasks.read_body import HeldBody
 from tests.app.job_clients import ended
@@ -223,44 +222,3 @@ def test_studies_have_what_was_answered_and_answer_what_comes(recorded: TestClie
     assert fresh["solver"] != first["solver"]
     again = sent(recorded, body | {"candidates": "all"}, **KNOWN)
     assert is_hit(again) and without_paths(again.json()) == without_paths(fresh), "the last one"
-
-
-def test_equal_requests_at_the_same_time_are_computed_once(recorded: TestClient) -> None:
-    body = move(payload=load(0.13))
-    with ThreadPoolExecutor(4) as pool:
-        answers = list(pool.map(lambda _: sent(recorded, body, **KNOWN), range(4)))
-    assert sum(map(is_hit, answers)) == 3
-    assert len({answer.json()["request"] for answer in answers}) == 4
-    assert len({answer.json()["id"] for answer in answers}) == 1
-    assert len({orjson.dumps(without_paths(answer.json())) for answer in answers}) == 1
-
-
-async def test_an_equal_request_that_ends_after_a_look_at_the_store_is_not_missed(
-    store: Store,
-) -> None:
-    asked, computed, in_flight = Asked("key", 1.0), list[float](), InFlight()
-    looked, goes_on = asyncio.Event(), asyncio.Event()
-
-    class Late(AnswerCache):
-        """Waits for the test after a look at the store in vain."""
-
-        async def _find(self, asked: Asked | None) -> TaskResult | None:
-            known = await super()._find(asked)
-            looked.set()
-            await goes_on.wait()
-            return known
-
-    async def compute(left: float) -> TaskResult:
-        computed.append(left)
-        return await keep_answer(store, Settings(), "optimize", result(1, "optimal"), None, asked)
-
-    late, other = (kind(store, None, False, in_flight) for kind in (Late, AnswerCache))
-    begun = asyncio.create_task(late.answer(asked, "late", 1.0, compute, False))
-    await looked.wait()
-    equal = asyncio.create_task(other.answer(asked, "other", 1.0, compute, False))
-    # The second request either ends, or waits for the first.
-    await asyncio.wait({equal}, timeout=0.5)
-    goes_on.set()
-    found = [await begun, await equal]
-    assert len(computed) == 1
-    assert found[0].kept_as == found[1].kept_as

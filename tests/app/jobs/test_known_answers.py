@@ -1,4 +1,4 @@
-"""Equal requests of jobs: one is computed, the others get copies of its answer."""
+"""Requests of jobs that are equal to answered ones get copies of their answers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from joulepath.app.access.client import OPERATOR
 from joulepath.app.answers.envelope import AnswerFigures
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions.base import InternalError
 from joulepath.app.store import jobs
 from joulepath.app.store.cache import Meaning
 from joulepath.app.store.jobs import NewJob, NewRequest
@@ -21,7 +20,6 @@ from joulepath.app.store.store import Store
 from joulepath.app.store.tables import JobRequest
 from joulepath.app.tasks.job_request import JobRequestTask, JobResult
 from joulepath.app.tasks.request_key import VERSION
-from joulepath.optimizer.exceptions import OutsideLimits
 from tests.app.jobs.test_dispatcher import BODY, Service, is_done, requests, until
 
 TURN = 0.3
@@ -77,28 +75,24 @@ async def document(service: Service, job_id: str, number: int) -> Any:
     return orjson.loads(unpacked(body))
 
 
-async def test_one_is_computed_and_the_others_get_its_answer(
+async def test_one_is_computed_and_later_ones_get_its_answer(
     store: Store, service: Service
 ) -> None:
-    service.work.slots = 2
-    service.dispatcher.start()
-    first = await send(service, *[asks()] * 20, asks("b"), asks(deadline=99.0))
-    await until(lambda: sorted(service.work.begun) == [0, 20])
     service.work.free.set()
-    await until(lambda: is_done(service, first))
-    found = await requests(store, first)
+    service.dispatcher.start()
+    first, _ = await done(service, asks(), asks("b"))
+    later, found = await done(service, *[asks()] * 200, asks("b"), asks(deadline=99.0))
+    assert service.work.begun == [0, 1], "those of another job are known, too"
     assert {each.state for each in found} == {"done"} and {each.energy for each in found} == {5.0}
-    for number in (*range(20), 21):
+    for number in (*range(200), 201):
         kept = found[number].answer_id
         own = {
-            "request": f"{first}.{number}",
+            "request": f"{later}.{number}",
             "id": kept,
             "by": f"{first}.0",
             "answer": f"/answers/{kept}",
         }
-        assert await document(service, first, number) == own
-    await done(service, asks(), asks("b"))
-    assert len(service.work.begun) == 2, "those of another job are known, too"
+        assert await document(service, later, number) == own
     await done(service, asks(), owner="somebody")
     await done(service, asks(version="another"), NewRequest("optimize", BODY, 10.0))
     assert len(service.work.begun) == 5
@@ -121,8 +115,9 @@ async def test_more_time_may_find_a_better_answer(service: Service) -> None:
     service.work.answer = partial(computed, status="feasible")
     service.work.free.set()
     service.dispatcher.start()
-    await done(service, asks(), asks(deadline=20.0), asks(deadline=5.0))
-    assert service.work.begun == [0, 1]
+    for deadline in (10.0, 20.0, 5.0):
+        await done(service, asks(deadline=deadline))
+    assert len(service.work.begun) == 2
 
 
 async def test_answers_that_refer_to_others_stay_in_their_job(service: Service) -> None:
@@ -131,49 +126,10 @@ async def test_answers_that_refer_to_others_stay_in_their_job(service: Service) 
     """
     service.work.free.set()
     service.dispatcher.start()
-    await done(service, asks(kind="cycle"), asks(kind="cycle"))
-    assert service.work.begun == [0]
-    await done(service, asks(kind="cycle"))
-    assert service.work.begun == [0, 0]
-
-
-@pytest.mark.parametrize(
-    ("error", "begun"),
-    [(OutsideLimits("start", "elbow_joint", 9.0, -1.0, 1.0), [0]), (InternalError(), [0, 1])],
-)
-async def test_only_a_request_that_is_wrong_fails_for_all(
-    error: Exception, begun: list[int], service: Service
-) -> None:
-    service.work.slots = 2
-    service.work.errors = [error]
-    service.work.free.set()
-    service.dispatcher.start()
-    job_id, found = await done(service, asks(), asks(), asks())
-    assert service.work.begun == begun
-    failed = [each for each in found if each.state == "failed"]
-    assert len(failed) == (3 if len(begun) == 1 else 1)
-    assert [each.problem and each.problem["instance"] for each in failed] == [
-        f"{job_id}.{each.number}" for each in failed
-    ]
-
-
-async def test_one_that_waits_for_another_can_be_cancelled(store: Store, service: Service) -> None:
-    first = await send(service, asks())
-    service.dispatcher.start()
-    await until(lambda: service.work.begun == [0])
-    second = await send(service, asks())
-    await until(lambda: service.dispatcher._equals.waiting == 1)
-    await service.jobs.cancel(second, OPERATOR)
-    await until(lambda: is_done(service, second))
-    third = await send(service, asks())
-    await until(lambda: service.dispatcher._equals.waiting == 1)
-    await service.jobs.cancel(first, OPERATOR)
-    await until(lambda: is_done(service, first))
-    service.work.free.set()
-    await until(lambda: is_done(service, third))
-    assert [each.state for each in await requests(store, third)] == ["done"], (
-        "it is computed in its place"
-    )
+    for _ in range(2):
+        await done(service, *[asks(kind="cycle")] * 100)
+    assert service.work.begun.count(0) == 2
+    assert len(service.work.begun) < 100, "within a job, later requests get copies"
 
 
 async def test_a_job_that_is_deleted_takes_its_answers_with_it(service: Service) -> None:
