@@ -48,7 +48,7 @@ HEAD = (
     "p99, ms | most |\n"
     "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
 )
-COUNTED_MESSAGES = ('"traceback"', "mended the queue", "did not end in time", "begins again")
+COUNTED_MESSAGES = ('"traceback"', "did not end in time", "begins again")
 """Texts to count in the log of the service."""
 DISCONNECTED = 0
 """Replaces the status if the client disconnected before the answer."""

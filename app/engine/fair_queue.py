@@ -64,7 +64,6 @@ class Loan:
         self.worker, self.place = worker, place
         self.counts = place is not None
         """Whether the worker counts as one of the client's workers."""
-        self.is_returned = False
 
 
 class FairQueue:
@@ -84,7 +83,6 @@ class FairQueue:
         self._waiting: dict[str, deque[Place]] = {}
         self._loans: dict[Worker, Loan | None] = {}
         self._changed = asyncio.Event()
-        self._suspects: dict[Worker | Loan | Place, str] = {}
 
     @contextmanager
     def place(self, client: str) -> Iterator[Place]:
@@ -162,41 +160,6 @@ class FairQueue:
         """Removes an ended worker."""
         self._loans.pop(worker, None)
 
-    def mend(self, workers: set[Worker]) -> list[str]:
-        """Repairs inconsistent states and returns a description of each; only a defect causes them.
-
-        An unknown worker is added, a worker with an abandoned loan becomes idle, and an idle worker
-        is lent if a place waits. An inconsistency counts from the second call on, because it may be
-        a transition within one turn of the event loop.
-
-        Args:
-            workers: all living workers.
-        """
-        before, self._suspects = self._suspects, self._wrong(workers)
-        found = [fault for what, fault in self._suspects.items() if before.get(what) == fault]
-        for what in self._suspects.keys() & before.keys():
-            if isinstance(what, Loan):
-                self._take_back(what)
-            elif what in workers - self._loans.keys():
-                self.put(what)
-        if found:
-            self._serve()
-        return found
-
-    def _wrong(self, workers: set[Worker]) -> dict[Worker | Loan | Place, str]:
-        """Inconsistent workers, loans and places, each with a description."""
-        wrong: dict[Worker | Loan | Place, str] = {}
-        wrong |= dict.fromkeys(workers - self._loans.keys(), "a worker was neither idle nor lent")
-        for loan in [each for each in self._loans.values() if each is not None]:
-            is_over = loan.is_returned or (
-                loan.place is not None and loan.place.state is State.IDLE
-            )
-            if is_over and loan.worker.alive and loan.worker.is_free:
-                wrong[loan] = "a worker was lent to nobody"
-        if (place := self._next()) is not None and self._idle_worker() is not None:
-            wrong[place] = "a request waited while a worker was idle"
-        return wrong
-
     async def _turn(self, place: Place) -> Loan:
         loop = asyncio.get_running_loop()
         place.granted, place.state, place.since = (
@@ -240,7 +203,6 @@ class FairQueue:
 
     def _return(self, loan: Loan) -> None:
         """Returns a worker, which may have to end its task first."""
-        loan.is_returned = True
         loan.worker.when_free(lambda: self._take_back(loan))
 
     def _take_back(self, loan: Loan) -> None:

@@ -35,8 +35,6 @@ class PoolSettings:
     """Longest delay of a replacement [s]."""
     longest_warm_up: float = 1800.0
     """Time of a worker for its start [s]; many kernels compile for minutes, a frozen one never."""
-    check_period: float = 1.0
-    """Time [s] between two checks of the queue's consistency."""
     most_deaths: int = 2
     """Dead workers after which a task is given up; the first one may have been killed by chance."""
 
@@ -97,7 +95,6 @@ class Engine:
             asyncio.create_task(self._keep(first=index == 0))
             for index in range(self._settings.workers)
         ]
-        self._keepers.append(asyncio.create_task(self._check()))
 
     async def stop(self) -> None:
         """Kills the workers and waits for their end."""
@@ -224,13 +221,6 @@ class Engine:
             self._workers.discard(worker)
             self.queue.remove(worker)
             self.restarts += 1
-
-    async def _check(self) -> None:
-        """Repairs the states of the queue periodically, so that a defect costs no worker."""
-        while True:
-            await asyncio.sleep(POOL.check_period)
-            for fault in self.queue.mend({worker for worker in self._workers if worker.alive}):
-                logger.error("mended the queue", extra={"fault": fault})
 
     def _has_warmed(self, worker: Worker) -> None:
         self._workers.add(worker)

@@ -274,9 +274,6 @@ class QueueMachine(RuleBasedStateMachine):
     @invariant()
     def nobody_is_confused(self) -> None:
         assert not self.noticed, self.noticed
-        assert self.queue.mend({worker for worker in self.workers if worker.alive}) == [], (
-            "it has to be mended"
-        )
         for request in [each for each in self.requests if each.running.done()]:
             self.requests.remove(request)
             if request.running.cancelled():
