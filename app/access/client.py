@@ -59,7 +59,7 @@ def _network(text: str) -> str:
 
 
 PUBLIC = re.compile(
-    r"/healthz|/readyz|/openapi\.json|/redoc|/docs(/[^/]+)?|/problems/[^/]+|/|/studio(/\w[\w.-]*)*"
+    r"/healthz|/readyz|/openapi\.json|/docs(/[^/]+)?|/problems/[^/]+|/|/studio(/\w[\w.-]*)*"
     r"|/help(/|(/\w[\w.-]*)*/?)"
 )
 """Paths without user data: probes, documentation, problem pages, the studio page."""

@@ -78,7 +78,6 @@ PUBLIC = [
     "/readyz",
     "/openapi.json",
     "/docs",
-    "/redoc",
     "/docs/swagger-ui.css",
     "/problems/unauthenticated",
     "/studio",

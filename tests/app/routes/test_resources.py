@@ -172,9 +172,8 @@ def test_any_other_is_replaced(client: TestClient, given: str) -> None:
     assert uuid.UUID(answer.headers["x-request-id"]).version == 4
 
 
-@pytest.mark.parametrize("path", ["/docs", "/redoc"])
-def test_documentation_needs_no_internet(client: TestClient, path: str) -> None:
-    page = client.get(path)
+def test_documentation_needs_no_internet(client: TestClient) -> None:
+    page = client.get("/docs")
     assert page.status_code == 200
     assert "//" not in re.sub(r"//.*|<!--.*?-->", "", page.text.replace("://", "EXTERNAL")), (
         "no scheme-relative address"
@@ -185,9 +184,8 @@ def test_documentation_needs_no_internet(client: TestClient, path: str) -> None:
     assert len(assets) >= 2
     for asset in assets:
         assert not asset.startswith("/"), "it holds behind a proxy's path, too"
-        answer = client.get(urljoin(path, asset))
+        answer = client.get(urljoin("/docs", asset))
         assert answer.status_code == 200
-        assert b"cdn.redoc" not in answer.content
 
 
 def test_requests_of_swagger_keep_the_path_of_a_proxy(client: TestClient) -> None:
