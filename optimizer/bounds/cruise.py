@@ -66,27 +66,12 @@ class Cruise:
     def losses(self, T: Array) -> tuple[Array, Array, Array, Array]:
         """Least losses for durations T (P,) [s].
 
+        By parts, ∫ g' (T - 2 t) dh = T g(c) - 2 ∫ g' t dh.
+
         Returns:
             Friction loss (P,) [J], its derivative by T [W], ∫ v² / c dt (P,), its derivative by T.
         """
         v, ramp = self.speed(T)
-        friction, slope, squares = self.joint_losses(T, v, ramp)
-        square = v * v
-        return friction.sum(axis=1), slope.sum(axis=1), squares @ self.copper, -square @ self.copper
-
-    def joint_losses(self, T: Array, v: Array, ramp: Array) -> tuple[Array, Array, Array]:
-        """Least losses of each joint for durations T (P,) [s].
-
-        By parts, ∫ g' (T - 2 t) dh = T g(c) - 2 ∫ g' t dh.
-
-        Args:
-            T: durations, shape (P,) [s].
-            v: speeds c of `speed`, shape (P, nq) [rad/s].
-            ramp: times of jerk ramps of `speed`, shape (P, nq) [s].
-
-        Returns:
-            Friction loss [J], its derivative by T [W], and ∫ v² dt, shape (P, nq).
-        """
         law, rise, square = self.friction, np.arcsinh(v / self.friction.speed), v * v
         bent = np.sqrt(square + law.speed**2)
         torque = law.curved * rise + law.viscous * v
@@ -102,7 +87,7 @@ class Cruise:
             - ramp * (square - self.ramp_speed**2)
         )
         slope = -(law.curved * square / bent + law.viscous * square)
-        return friction, slope, squares
+        return friction.sum(axis=1), slope.sum(axis=1), squares @ self.copper, -square @ self.copper
 
     @cached_property
     def _ramp_loss(self) -> Array:

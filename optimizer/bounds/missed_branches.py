@@ -42,10 +42,7 @@ def all_branches_known(problem: Problem) -> bool:
 
 
 def bound_of_missed_branches(
-    prepared: PreparedProblem,
-    candidates: Sequence[Pair],
-    deadline: Deadline = NEVER,
-    enough: float = np.inf,
+    prepared: PreparedProblem, candidates: Sequence[Pair], deadline: Deadline = NEVER
 ) -> float:
     """Lower bound on motions between poses in configurations of no candidate [J]; inf for none.
 
@@ -60,17 +57,16 @@ def bound_of_missed_branches(
         prepared: problem of the motions.
         candidates: pairs of known end configurations.
         deadline: deadline of the search, which then returns its bound so far.
-        enough: sufficient bound [J], as in `self_motion_bound`.
     """
     problem = prepared.problem
     if all_branches_known(problem):
-        return self_motion_bound(prepared, candidates, deadline, enough)
+        return self_motion_bound(prepared, candidates, deadline)
     has_free_goal = any(isinstance(goal, ConeOrientedPose) for goal in members(problem.goal))
     if not (_poses(problem.start) and has_free_goal):
         starts = _covered(prepared, [pair.start for pair in candidates], problem.start)
         goals = _covered(prepared, [pair.goal for pair in candidates], problem.goal)
         if starts is not None and goals is not None:
-            return bound_between_curves(prepared, starts, goals, deadline, enough)
+            return bound_between_curves(prepared, starts, goals, deadline)
     if _poses(problem.start) and problem.arm.robot.nq > POSE_FREEDOMS:
         return _bound_of_any(prepared)
     return _bound_by_boxes(prepared, candidates, deadline)

@@ -128,7 +128,7 @@ def final_bound(state: SearchState, objective: float) -> tuple[float, bool]:
         if candidate.lower_bound >= objective:
             candidate.settle(CandidateStatus.PRUNED, Reason.BOUND)
     # only samples of self-motions and free orientations are solved: a bound rules out the others
-    unknown, beside = bound_of_missed_branches(prepared, candidates, deadline, objective), np.inf
+    unknown, beside = bound_of_missed_branches(prepared, candidates, deadline), np.inf
     if state.problem.tool_path is None:
         free = bound_of_free_goals(prepared, candidates, deadline, objective)
         unknown = min(unknown, free)

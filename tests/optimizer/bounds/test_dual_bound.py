@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
@@ -18,14 +19,14 @@ from joulepath.optimizer.bounds.net_energy import copper_multiplier
 from joulepath.optimizer.bounds.path_terms import path_terms
 from joulepath.optimizer.bounds.reference import Reference, half_sides
 from joulepath.optimizer.bounds.weights import Weights
+from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.seven_segment import shortest_duration
-from joulepath.optimizer.motion.spline import sample
+from joulepath.optimizer.motion.spline import peak_rates, sample, spline_of
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import DURATIONS
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.search.baselines import guesses
 from tests.optimizer.bounds.numpy_terms import greatest
-from tests.optimizer.bounds.test_holding import NAMES, NEAR, SAMPLED, SHIFT, asked, many_motions
 from tests.optimizer.bounds.test_lower_bound import CONDITIONS, QUADRATURE, Torques, ends, motions
 from tests.optimizer.moves import GOAL, ROBOT, START, problem
 from tests.selection import long_but
@@ -42,7 +43,51 @@ MOVES = 2
 NARROW = 1.015  # a cell of durations
 LOST = 0.01  # what such a cell may take from the bound
 CLOSELY = 0.02  # relative: how near the bound comes to what it bounds
+SAMPLES = 601
+SAMPLED = 1e-3  # relative; friction turns fast where a speed changes its sign
+NEAR = 0.9  # of the linear energy
+SHIFT = 20.0  # J added to both, so that a ratio tells of energies near zero
+NAMES = [name for name in CONDITIONS if "load" not in name or name == "loaded and tilted"]
 USEFUL = 0.3  # of the energy, where nearly all of it is copper loss; elsewhere more
+
+
+def asked(name: str) -> Problem:
+    return problem(objective="electrical", duration_max=500.0, **CONDITIONS[name])
+
+
+# times [s], positions, speeds, accelerations and weights [s], and the duration [s]
+Sampled = tuple[Array, Array, Array, Array, Array, float]
+
+
+def many_motions(
+    task: Problem, start: Array, goal: Array, rng: np.random.Generator
+) -> Iterator[Sampled]:
+    """Motions within the limits: the fastest, slowed and strongly slowed ones, and wavy ones.
+
+    The wavy motions leave the straight line by half waves.
+    """
+    least = max(float(shortest_duration(goal - start, task.arm.active_limits)), DURATIONS.least)
+    for stretch in (1.0, 1.1, 1.5, 4.0):
+        motion = guesses(task, start, goal, max(stretch * least, DURATIONS.least))["ruckig_slowed"]
+        yield motion.t, motion.q, motion.v, motion.a, motion.weights, motion.duration
+    space = bspline.uniform(19)
+    line = start + np.outer(space.quintic, goal - start)
+    share = np.linspace(0, 1, space.n)[:, None]
+    for size in (0.02, 0.1, 0.3):
+        for waves in (1, 2):
+            points = line + size * np.sin(waves * np.pi * share) * rng.normal(size=6) * (
+                rng.random(6) < 0.5
+            )
+            points[:3], points[-3:] = start, goal
+            peaks = peak_rates(spline_of(space, points, 1.0)) / task.arm.active_limits.rates
+            duration = max(
+                float((peaks.max(axis=1) ** (1 / np.arange(1, 4))).max()) * (1 + 1e-9),
+                DURATIONS.least,
+            )
+            duration *= rng.choice([1.0, 1.5, 4.0])
+            t = np.linspace(0, duration, SAMPLES)
+            q, v, a = sample(spline_of(space, points, duration), t)
+            yield t, q, v, a, simpson(np.eye(SAMPLES), dx=duration / (SAMPLES - 1)), duration
 
 
 def dual_of(

@@ -12,7 +12,6 @@ import pytest
 
 from joulepath import AnyOf, Dwell, JoulepathError, load_robot, optimize
 from joulepath.models.robot import Array
-from joulepath.optimizer.bounds.holding_cells import HoldingCells
 from joulepath.optimizer.bounds.lower_bound import lower_bounds
 from joulepath.optimizer.bounds.missed_branches import all_branches_known, bound_of_missed_branches
 from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
@@ -114,11 +113,8 @@ def test_no_configuration_of_the_pose_is_below(given: dict[str, Any]) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("count", long_but((3,), (3, 60)))
-def test_an_attack_without_curves_finds_none_below(
-    count: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """No attack gets below the bound, which excludes the copper loss of holding."""
-    monkeypatch.setattr(HoldingCells, "of", lambda prepared: None)
+def test_an_attack_without_curves_finds_none_below(count: int) -> None:
+    """No attack gets below the bound."""
     ratios = []
     for k, (start, goal) in enumerate(tasks("gen3", count)):
         ratios.append(whole(start, pose_of(GEN3, goal)) / attacked(start, goal, seed=90 + k))

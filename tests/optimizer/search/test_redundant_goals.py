@@ -24,7 +24,6 @@ from joulepath import (
     optimize,
 )
 from joulepath.models.robot import Array
-from joulepath.optimizer.bounds.holding_cells import HoldingCells
 from joulepath.optimizer.bounds.self_motion_bound import self_motion_bound
 from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import CollisionModel, collision_model
@@ -42,16 +41,6 @@ REFINED = 1e-3
 ROUNDING = 1e-12
 # s: far more than any search takes, even on a busy machine
 AMPLE = 300.0
-# least share by which the copper loss of holding raises at least one bound, and number of tasks to
-# solve
-RAISED = 0.01
-SOLVED = 2
-# start and goal [rad] of an xarm7, with a good curve of the goal passing half a turn; the bound
-# rises by a share of 0.031, or 0.011 with wide boxes
-PASSING = np.array(
-    [[5.88, -0.49, 3.3, 2.46, 4.1, 1.22, -4.77], [1.06, 0.64, 2.12, 1.79, 3.32, -0.01, -3.04]]
-)
-PASSING_RAISED = 0.02
 # least distance of links from each other at the ends of a task [m]
 CLEAR = 0.01
 
@@ -142,11 +131,7 @@ def test_optima_that_samples_hardly_show_are_found(
     ("name", "at_start"),
     long_but([("panda", False), ("iiwa14", True)], product(("panda", "iiwa14"), (False, True))),
 )
-def test_no_member_has_a_lower_bound_below_the_curves(
-    name: str, at_start: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Both bounds exclude the copper loss of holding, since the bound of a pair has none."""
-    monkeypatch.setattr(HoldingCells, "of", lambda prepared: None)
+def test_no_member_has_a_lower_bound_below_the_curves(name: str, at_start: bool) -> None:
     robot = load_robot(name)
     for start, goal in tasks(name, 3):
         one = (pose_of(robot, goal), start) if at_start else (start, pose_of(robot, goal))
@@ -165,45 +150,6 @@ def test_no_member_has_a_lower_bound_below_the_curves(
             except JoulepathError:
                 continue
             assert min(each.lower_bound for each in candidates) >= whole * (1 - ROUNDING)
-
-
-def plain_and_held(posed: Problem, monkeypatch: pytest.MonkeyPatch) -> tuple[float, float]:
-    """The bounds [J] of the curves, without and with the copper loss of holding."""
-    prepared = PreparedProblem.of(posed)
-    candidates = pairs(prepared, ends(prepared, "start")[0], ends(prepared, "goal")[0])
-    held = self_motion_bound(prepared, candidates)
-    with monkeypatch.context() as without:
-        without.setattr(HoldingCells, "of", lambda prepared: None)
-        return self_motion_bound(prepared, candidates), held
-
-
-@pytest.mark.long
-def test_holding_raises_the_bound_of_curves_and_no_motion_spends_less(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    robot, raised = load_robot("xarm7"), list[float]()
-    for start, goal in tasks("xarm7", 4):
-        posed = asked(robot, start, pose_of(robot, goal))
-        plain, held = plain_and_held(posed, monkeypatch)
-        assert held >= plain
-        raised.append(held / plain - 1)
-        if len(raised) <= SOLVED:
-            assert optimize(posed).energy.electrical.total >= held
-    assert max(raised) > RAISED
-
-
-def test_a_curve_whose_angles_pass_half_a_turn_is_raised_too(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Holding raises the bound of a curve with angles past half a turn.
-
-    The angles of neighbours on this curve differ by a full turn, without an effect on their box.
-    """
-    robot = load_robot("xarm7")
-    posed = asked(robot, PASSING[0], pose_of(robot, PASSING[1]))
-    plain, held = plain_and_held(posed, monkeypatch)
-    assert held / plain - 1 > PASSING_RAISED
-    assert optimize(posed).energy.electrical.total >= held
 
 
 ROBOT = load_robot("panda")
