@@ -290,7 +290,8 @@ def graded(
         next_to_end: distance from an end of [0, 1] up to which a switch is left out.
         least_nodes: least number of quadrature nodes.
     """
-    edges = np.concatenate([[0.0], _inner(switches, next_to_end), [1.0]])
+    inner = switches[(switches > next_to_end) & (switches < 1 - next_to_end)]
+    edges = np.concatenate([[0.0], inner, [1.0]])
     spans = np.concatenate([[np.inf], np.diff(edges), [np.inf]])
     breaks = [0.0]
     for k, (a, b) in enumerate(pairwise(edges)):
@@ -318,22 +319,3 @@ def _between(
         else:
             upper.append(upper[-1] - down)
             after = down
-
-
-def moved(knots: Array, switches: Array, repeat: int) -> Array | None:
-    """Knots of a `graded` space after a shift of its knots of multiplicity `repeat` to other
-    switches (k,).
-
-    The other knots keep their relative places between them. None if the number of switches differs.
-    """
-    breaks, counts = np.unique(knots, return_counts=True)
-    old, new = breaks[1:-1][counts[1:-1] == repeat], _inner(switches)
-    if len(old) != len(new):
-        return None
-    old, new = (np.concatenate([[0.0], at, [1.0]]) for at in (old, new))
-    return np.repeat(np.interp(breaks, old, new), counts)
-
-
-def _inner(switches: Array, next_to_end: float = BASIS.end_margin) -> Array:
-    """Switches farther than `next_to_end` from both ends."""
-    return switches[(switches > next_to_end) & (switches < 1 - next_to_end)]

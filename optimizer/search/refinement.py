@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from joulepath.optimizer.dynamics.plant import has_corners
-from joulepath.optimizer.motion.spline import Spline, retimed, sampled
+from joulepath.optimizer.motion.spline import retimed, sampled
 from joulepath.optimizer.search.attempts import improve, solve_from
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.sharpening import sharpen
@@ -18,7 +18,6 @@ from joulepath.optimizer.search.state import DURATION_TOLERANCE, SearchState
 from joulepath.optimizer.solve.methods.free_spline import FREE_SPLINE
 from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.solve_result import SolveResult
-from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 
 
 @dataclass(frozen=True)
@@ -73,11 +72,7 @@ def refine(state: SearchState, candidate: Candidate) -> None:
     if method.may_refine(candidate.spline) and not deadline.passed:
         coarse = candidate.spline
         exact = state.lasts_below(FREE_SPLINE.exact_below, candidate)
-        tight = state.lasts_below(SPLINE_SPACES.tight, candidate)
-        if tight and slides(state.prepared, candidate):
-            follow_switches(state, candidate)
-        else:
-            improve(state, candidate, lambda solver: solver.refined(coarse, fine=exact))
+        improve(state, candidate, lambda solver: solver.refined(coarse, fine=exact))
         if exact and candidate.spline is coarse and not state.deadline.passed:
             improve(state, candidate, lambda solver: solver.refined(coarse, fine=False))
     if method.may_grade(candidate.spline) and not deadline.passed:
@@ -206,46 +201,3 @@ def _is_elsewhere(state: SearchState, rival: Candidate) -> bool:
         for each in state.candidates
         if each.refined
     )
-
-
-@dataclass(frozen=True)
-class SwitchKnotSettings:
-    """Settings of solves with knots at the switches of jerk."""
-
-    first_progress: float = 1e-3
-    """Relative decrease of the cost that a further step of a solve must promise."""
-    most_repeats: int = 2
-    """Largest number of further solves."""
-    least_saving: float = 3e-3
-    """Relative decrease of the energy below which no further solve follows: each solve saves some
-    eighth of what the one before saved."""
-
-
-SWITCH_KNOTS = SwitchKnotSettings()
-
-
-def follow_switches(state: SearchState, candidate: Candidate) -> None:
-    """Solve a candidate with sliding ends with knots at the switches of jerk, until the posture
-    settles.
-
-    The switching instants of jerk depend on the posture at the ends. The first solve with knots at
-    the switches ends early, because its posture moves away from these instants. Further solves
-    start from its motion, with knots at the switches of the motion to the new posture.
-    """
-    coarse = candidate.spline
-    _solve_at_switches(state, candidate, coarse)
-    if candidate.spline is coarse:
-        return
-    for _ in range(SWITCH_KNOTS.most_repeats):
-        before = candidate.energy or 0.0
-        if state.deadline.passed:
-            return
-        _solve_at_switches(state, candidate, candidate.spline)
-        if before - (candidate.energy or 0.0) < SWITCH_KNOTS.least_saving * abs(before):
-            return
-
-
-def _solve_at_switches(state: SearchState, candidate: Candidate, spline: Spline) -> None:
-    """Solve from a motion; knots at switches follow the posture."""
-    progress = SWITCH_KNOTS.first_progress
-    improve(state, candidate, lambda solver: solver.solve_at_switches(spline, progress))

@@ -24,7 +24,6 @@ from joulepath.optimizer.search.free_members import bounded
 from joulepath.optimizer.search.freed_duration import start_from_free_duration
 from joulepath.optimizer.search.moving_time import coarse_swing
 from joulepath.optimizer.search.no_trajectory import no_motion
-from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.other_ways import explore_other_ways
 from joulepath.optimizer.search.outer_turns import families_of
 from joulepath.optimizer.search.path_ends import path_candidates
@@ -109,7 +108,6 @@ def refine_best(state: SearchState) -> None:
     best = state.best()
     if best is None or best.refused:
         return
-    best = start_beside(state, best)
     rest_on_the_way(state, best)
     coarse = best.energy or 0.0
     refine(state, best)

@@ -63,8 +63,8 @@ class Method(ABC):
     """Whether `solve_from` is available."""
 
     free_control_points: ClassVar[bool] = False
-    """Whether every control point of every joint is free. Then `solve_control_points` and
-    `solve_at_switches` are available, and the ends may slide along self-motions."""
+    """Whether every control point of every joint is free. Then `solve_control_points` is available,
+    and the ends may slide along self-motions."""
 
     converges: ClassVar[bool] = True
     """Whether a solve ends in a local optimum."""
@@ -163,15 +163,3 @@ class Method(ABC):
             t: times of the samples, shape (k,), from 0 to 1.
         """
         return SolveResult(SolveStatus.FAILED, SolveReason.NO_INITIAL_GUESS)
-
-    def solve_at_switches(self, spline: Spline, progress: float) -> SolveResult:
-        """Solve from a motion, with knots at the switches of jerk between the present ends.
-
-        The ends may have moved along their self-motions since the motion was found.
-
-        Args:
-            spline: the motion.
-            progress: relative decrease of the cost below which the solve ends, if the motion has
-                no knots at switches of jerk yet.
-        """
-        return SolveResult(SolveStatus.FAILED, SolveReason.NO_FREE_CONTROL_POINTS)

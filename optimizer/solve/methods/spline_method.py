@@ -117,27 +117,6 @@ class SplineMethod(SqpMethod):
         repeat = settings.exact_multiplicity if fine else settings.refined_multiplicity
         return self._solve_in(self.spaces.at_switches(float(t[-1]), repeat), q, t)
 
-    def solve_at_switches(self, spline: Spline, progress: float) -> SolveResult:
-        """Solve from a motion, with knots at the switches of jerk between the present ends.
-
-        If the motion has such knots, they move to the present switches. The control points stay, so
-        that the motion hardly changes and jerk still jumps at its knots. If the number of switches
-        has changed, another spline is fitted to the motion.
-        """
-        exact = SPLINE_SPACES.exact_multiplicity
-        if self.may_refine(spline):
-            q, t = sampled(spline)
-            space = self.spaces.at_switches(float(t[-1]), exact)
-            return self._solve_in(space, q, t, progress)
-        duration, line = spline.duration, self.coordinates
-        knots = bspline.moved(spline.knots / duration, self.spaces.switches(duration), exact)
-        if knots is None:
-            return self.solve_from(*sampled(spline), fine=True)
-        points = line.from_joints(spline.control_points)
-        return self._refined(
-            Guess(Basis.of(knots), points, duration, nearly_feasible=True), sampled(spline)[0]
-        )
-
     def solve_evenly(self, q: Array, t: Array, count: int, progress: float) -> SolveResult:
         """Solve from samples q (k, nq) [rad] at times t (k,) [s], with evenly spaced knots."""
         return self._solve_in(self.spaces.of_first_solve(count, float(t[-1])), q, t, progress)

@@ -171,26 +171,6 @@ def test_switches_at_the_ends_make_no_knots() -> None:
     assert spans(space).min() > 1e-3
 
 
-@pytest.mark.parametrize("repeat", [2, 3])
-def test_moved_knots_follow_the_switches(repeat: int) -> None:
-    """The other knots keep their relative places, and the same control points give nearly the same
-    motion.
-    """
-    space, by = bspline.graded(SWITCHES, repeat), 1e-3
-    fewer = np.append(1e-4, SWITCHES[1:])
-    assert bspline.moved(space.knots, fewer, repeat) is None
-    moved = bspline.moved(space.knots, SWITCHES + by, repeat)
-    assert moved is not None
-    assert np.isin(SWITCHES + by, moved).all() and not np.isin(SWITCHES, moved).any()
-    before, after = (np.unique(knots, return_counts=True)[1] for knots in (space.knots, moved))
-    assert after.tolist() == before.tolist()
-    assert np.abs(moved - space.knots).max() <= by + EXACT
-    t = np.linspace(0.0, 1.0, 101)
-    points = space.fit(quintic.fraction(t)[:, None], t)
-    change = bspline.basis_matrix(moved, t) @ points - space.matrix(t) @ points
-    assert 0 < np.abs(change).max() < 3 * by
-
-
 def test_refit_is_exact_on_a_refinement(space: Basis) -> None:
     """More knots and knots repeated more often: the same curve, for several joints at once."""
     rng = np.random.default_rng(5)

@@ -13,7 +13,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.motion.seven_segment import ramp, shortest_duration
-from joulepath.optimizer.motion.spline import Spline, sampled
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.methods import METHODS, solver_for
@@ -133,24 +133,6 @@ def test_minimum_time_ignores_the_duration_asked_for() -> None:
 def test_a_deadline_that_has_passed_ends_the_attempt(method: str) -> None:
     attempt = solver(START, GOAL, method=method, wait=-1.0).solve()
     assert attempt.status is SolveStatus.OUT_OF_TIME and attempt.spline is None
-
-
-def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches_now() -> None:
-    """After a move of the goal, a solve with knots at the jumps of jerk starts from the old motion.
-
-    It takes fewer steps than a start from a fit, needs no more energy, and is within the limits.
-    """
-    steps = np.zeros(2, dtype=int)
-    for start, goal in ((START, GOAL), *random_moves(3, 1)):
-        own, moved = solver(start, goal + 0.02), solver(start, goal)
-        tight = spline(own.solve_at_switches(spline(own.solve()), 1e-3))
-        again = moved.solve_at_switches(tight, 1e-3)
-        fitted = moved.solve_from(*sampled(tight), fine=True)
-        steps += again.iterations, fitted.iterations
-        cost = moved.prepared.cost_of
-        assert cost(spline(again)) <= cost(spline(fitted)) * (1 + 1e-3)
-        assert_held(problem(start, goal), spline(again))
-    assert steps[0] < steps[1]
 
 
 def slowly(speed: float, **given: object) -> FreeSpline:
