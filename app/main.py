@@ -41,7 +41,7 @@ from joulepath.app.http.openapi import install_openapi
 from joulepath.app.http.request_context import RequestContext
 from joulepath.app.http.transfers import Transfers
 from joulepath.app.jobs.dispatcher import Dispatcher
-from joulepath.app.jobs.executor import ClusterExecutor, Executor, LocalExecutor
+from joulepath.app.jobs.executor import Executor
 from joulepath.app.jobs.jobs import Jobs
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
@@ -114,9 +114,9 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     app.state.store = store = Store(settings.database_url)
     link = None if settings.cluster is None else Cluster(settings.cluster)
     app.state.cluster = link
-    executor: Executor = LocalExecutor(engine, store, settings.workers_for_jobs)
+    executor = Executor(engine.spare.run, store, lambda: settings.workers_for_jobs)
     if link is not None:
-        executor = ClusterExecutor(link, store)
+        executor = Executor(link.run, store, lambda: link.slots)
         link.start()
     dispatcher = Dispatcher(store, executor, settings)
     app.state.jobs = Jobs(store, dispatcher, settings)

@@ -117,10 +117,6 @@ class Engine:
         for limit in [each for each in self._in_flight if not each.expired()]:
             limit.reschedule(min(limit.when() or self._latest_end, self._latest_end))
 
-    def of_client(self, client: str) -> ClientEngine:
-        """The engine for the requests of one client."""
-        return ClientEngine(self, client)
-
     async def run(
         self, task: Task, deadline: float, client: str = "", tell: Listener = no_listener
     ) -> TaskResult:
@@ -230,15 +226,3 @@ class Engine:
         if not self._was_ready and self.warm_workers == self._settings.workers:
             self._was_ready = True
             logger.info("ready", extra={"workers": self.warm_workers})
-
-
-@dataclass(frozen=True)
-class ClientEngine:
-    """The engine for the requests of one client; `client` is its name."""
-
-    engine: Engine
-    client: str
-
-    async def run(self, task: Task, deadline: float, tell: Listener = no_listener) -> TaskResult:
-        """See `Engine.run`."""
-        return await self.engine.run(task, deadline, self.client, tell)

@@ -26,11 +26,11 @@ from joulepath.optimizer.problem.robots import load_robot
 from joulepath.optimizer.progress import no_listener
 
 
-class Runner(Protocol):
-    """A runner of tasks: the engine, or a process running its own tasks."""
+class Run(Protocol):
+    """A function for the result of a task in at most `deadline` [s]; `tell` receives its events."""
 
-    async def run(self, task: Task, deadline: float, tell: Listener = no_listener) -> TaskResult:
-        """The result of a task in at most `deadline` [s]; `tell` receives its events."""
+    async def __call__(self, task: Task, deadline: float, *, tell: Listener) -> TaskResult:
+        """The result of the task."""
         ...
 
 
@@ -103,7 +103,7 @@ class Needs:
 class ArmEngine:
     """Runs tasks about bundled or added robots, with their own or identified figures."""
 
-    engine: Runner
+    run_one: Run
     store: Store
 
     async def run(self, task: Task, deadline: float, tell: Listener = no_listener) -> TaskResult:
@@ -117,9 +117,8 @@ class ArmEngine:
         while True:
             given = await needs.given(self.store)
             try:
-                return await self.engine.run(
-                    Equipped(task, given) if given else task, deadline, tell
-                )
+                equipped = Equipped(task, given) if given else task
+                return await self.run_one(equipped, deadline, tell=tell)
             # only the worker reads the body of an upload, or a kept answer, and the names in it
             except (UnknownRobot, UnknownFigures, UnknownLog, PartsNeeded) as error:
                 needs = needs.after(error)

@@ -12,16 +12,11 @@ from joulepath.app.api.robots.joint_limits import MEDIA_TYPE as YAML
 from joulepath.app.api.robots.joint_limits import JointLimitsQuery, JointLimitsTask
 from joulepath.app.api.robots.mjcf import MjcfTask
 from joulepath.app.api.robots.pictures import MEDIA_TYPE, PictureTask, digest, kept
-from joulepath.app.api.shared.dependencies import (
-    ServiceClientEngine,
-    ServiceSettings,
-    ServiceStore,
-)
+from joulepath.app.api.shared.dependencies import ServiceStore
 from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
 from joulepath.app.exceptions.stored import NoMeshes, StoreUnavailable
-from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import is_known
 from joulepath.app.store import robots
@@ -129,11 +124,7 @@ async def joint_limits(
     },
 )
 async def meshes(
-    request: Request,
-    name: Name,
-    settings: ServiceSettings,
-    engine: ServiceClientEngine,
-    store: ServiceStore,
+    request: Request, name: Name, tasks: ServiceTasks, store: ServiceStore
 ) -> Response:
     """Simplified meshes of the maker as a glTF file, with one node per link. A node has the name
     and the frame of its link. Available if `has_meshes` of `GET /robots/{name}` is true."""
@@ -147,8 +138,5 @@ async def meshes(
         return Response(status_code=304, headers=headers)
     content = await run_in_threadpool(kept, name)
     if content is None:
-        task = PictureTask(name, request.state.id)
-        content = (
-            await unless_disconnected(request, engine.run(task, settings.max_deadline))
-        ).document
+        content = (await tasks.result(PictureTask(name, tasks.request_id))).document
     return Response(content, headers=headers, media_type=MEDIA_TYPE)

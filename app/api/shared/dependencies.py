@@ -5,6 +5,7 @@ No other module of this room reads the application's state.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import Depends, Request
@@ -12,7 +13,7 @@ from fastapi import Depends, Request
 from joulepath.app.access.client import Client
 from joulepath.app.api.shared.parameters import is_fresh
 from joulepath.app.cluster.link import Cluster
-from joulepath.app.engine.pool import ClientEngine, Engine
+from joulepath.app.engine.pool import Engine
 from joulepath.app.http.client import client_of
 from joulepath.app.http.metrics import Metrics
 from joulepath.app.jobs.jobs import Jobs
@@ -48,16 +49,10 @@ ServiceEngine = Annotated[Engine, _of_app("engine")]
 ServiceStore = Annotated[Store, _of_app("store")]
 
 
-async def _client_engine(engine: ServiceEngine, client: ServiceClient) -> ClientEngine:
-    return engine.of_client(client.name)
-
-
-ServiceClientEngine = Annotated[ClientEngine, Depends(_client_engine)]
-"""The engine for all requests of the client."""
-
-
-async def _arm_engine(engine: ServiceClientEngine, store: ServiceStore) -> ArmEngine:
-    return ArmEngine(engine, store)
+async def _arm_engine(
+    engine: ServiceEngine, client: ServiceClient, store: ServiceStore
+) -> ArmEngine:
+    return ArmEngine(partial(engine.run, client=client.name), store)
 
 
 async def _cache(request: Request, store: ServiceStore, client: ServiceClient) -> AnswerCache:

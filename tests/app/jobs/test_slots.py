@@ -15,7 +15,7 @@ from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.engine.task import Ended, Take, Work, taking
 from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.queue import ClusterUnavailable
-from joulepath.app.jobs.executor import ClusterExecutor, LocalExecutor
+from joulepath.app.jobs.executor import Executor
 from joulepath.app.store import job_events, logs
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import StoredLog, new_id, now
@@ -133,8 +133,8 @@ async def test_nobody_listens_to_short_requests(service: Service) -> None:
     assert service.work.tell is no_listener
 
 
-class Runner:
-    """A substitute for the cluster and for the workers of this service."""
+class Workers:
+    """A substitute for the cluster, or for the workers of this service."""
 
     def __init__(self) -> None:
         self.tasks: list[Any] = []
@@ -144,15 +144,8 @@ class Runner:
             self.tasks.append(work.task)
             work.ended(InternalError())
 
-    @property
-    def spare(self) -> Runner:
-        return self
 
-
-@pytest.mark.parametrize("where", ["here", "cluster"])
-async def test_an_identification_gets_its_logs_wherever_it_is_computed(
-    where: str, store: Store
-) -> None:
+async def test_an_identification_gets_its_logs(store: Store) -> None:
     log = StoredLog(
         id=new_id(),
         robot="ur5e",
@@ -164,17 +157,14 @@ async def test_an_identification_gets_its_logs_wherever_it_is_computed(
     )
     await store.write(partial(logs.add, log=log, most=100))
     body = packed(json.dumps({"logs": [log.id]}).encode())
-    runner: Any = Runner()
-    executor = (
-        LocalExecutor(runner, store, 1) if where == "here" else ClusterExecutor(runner, store)
-    )
+    workers = Workers()
     ended: list[Ended] = []
     others = [
         Work(JobRequestTask(kind, body, "job.0"), 1.0, ended.append)
         for kind in (IDENTIFY, "optimize")
     ]
-    await executor.run(taking(*others))
-    assert [task.logs for task in runner.tasks] == [
+    await Executor(workers.run, store, lambda: 1).run(taking(*others))
+    assert [task.logs for task in workers.tasks] == [
         (),
         (GivenLog(log.id, {"robot": "ur5e"}, b"log"),),
     ]
