@@ -11,7 +11,7 @@ from sqlalchemy import Select, and_, func, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
-from joulepath.app.access.client import Client, check_owner
+from joulepath.app.access.client import Client
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions.stored import AnswerInUse, UnknownAnswer
@@ -108,9 +108,7 @@ class Wanted:
             )
         if self.job is not None:
             query = query.where(Answer.job_id == self.job)
-        if self.search is not None:
-            query = query.where(having(self.search, Answer.name, Answer.robot, Answer.kind))
-        return query
+        return query.where(having(self.search, Answer.name, Answer.robot, Answer.kind))
 
 
 def page(
@@ -133,8 +131,7 @@ def rename(
     Raises UnknownAnswer or NotOwner.
     """
     documents = [defer(column, raiseload=True) for column in (Answer.body, Answer.request)]
-    answer = by_id(session, Answer, answer_id, UnknownAnswer, options=documents)
-    check_owner(client, answer.owner)
+    answer = by_id(session, Answer, answer_id, UnknownAnswer, client, options=documents)
     answer.name = name
     if typed is not None:
         answer.size += len(orjson.dumps(typed)) - len(orjson.dumps(answer.typed or {}))
@@ -146,8 +143,7 @@ def delete(session: Session, answer_id: str, client: Client) -> None:
     """Deletes an answer. Raises UnknownAnswer, NotOwner, or AnswerInUse for an answer of a study or
     of a job.
     """
-    answer = by_id(session, Answer, answer_id, UnknownAnswer)
-    check_owner(client, answer.owner)
+    answer = by_id(session, Answer, answer_id, UnknownAnswer, client)
     if answer.study_id is not None or answer.job_id is not None:
         raise AnswerInUse
     session.delete(answer)

@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from joulepath.app.access.client import Client, check_owner
+from joulepath.app.access.client import Client
 from joulepath.app.exceptions.stored import FiguresInUse, TooManyFigures, UnknownFigures
 from joulepath.app.store.shares import COUNT, room_of
 from joulepath.app.store.tables import Figures, Study, by_id, now
@@ -55,8 +55,7 @@ def get(session: Session, id: str) -> Figures:
 
 def delete(session: Session, id: str, client: Client) -> None:
     """Deletes figures. Raises UnknownFigures, NotOwner, or FiguresInUse by a study."""
-    figures = get(session, id)
-    check_owner(client, figures.owner)
+    figures = by_id(session, Figures, id, partial(UnknownFigures, id), client)
     if session.scalar(select(Study.id).where(Study.figures == id).limit(1)) is not None:
         raise FiguresInUse
     session.delete(figures)

@@ -10,7 +10,7 @@ from sqlalchemy import ColumnElement, Select, insert, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
-from joulepath.app.access.client import Client, check_owner
+from joulepath.app.access.client import Client
 from joulepath.app.exceptions.queue import TooManyWaiting, TooManyWaitingOfClient
 from joulepath.app.exceptions.stored import JobNotCancellable, KeyReused, UnknownJob
 from joulepath.app.store.cache import Meaning
@@ -107,7 +107,7 @@ def create(
 
 def view(session: Session, job_id: str) -> JobView:
     """A job and its counts. Raises UnknownJob."""
-    job = _job(session, job_id)
+    job = by_id(session, Job, job_id, UnknownJob)
     return JobView(job, counts_of(session, [job.id])[job.id])
 
 
@@ -126,8 +126,7 @@ class Wanted:
         """The query for these jobs."""
         if self.state is not None:
             query = query.where(Job.state == self.state)
-        if self.search is not None:
-            query = query.where(having(self.search, Job.name))
+        query = query.where(having(self.search, Job.name))
         if self.without is not None:
             first = (JobRequest.job_id == Job.id) & (JobRequest.number == 0)
             query = query.join(JobRequest, first).where(JobRequest.kind != self.without)
@@ -154,11 +153,8 @@ def page_of_kind(
     """
     query = select(Job, JobRequest, Answer.robot).join(JobRequest, JobRequest.job_id == Job.id)
     query = query.outerjoin(Answer, Answer.id == JobRequest.answer_id)
-    query = query.where(Job.total == 1, JobRequest.kind == kind).options(
-        defer(JobRequest.body, raiseload=True)
-    )
-    if search is not None:
-        query = query.where(having(search, Job.name, Answer.robot))
+    which = (Job.total == 1, JobRequest.kind == kind, having(search, Job.name, Answer.robot))
+    query = query.where(*which).options(defer(JobRequest.body, raiseload=True))
     rows = session.execute(newest_first(query, Job, limit, after))
     found = [(job, request, robot) for job, request, robot in rows]
     return found[:limit], following([job for job, _, _ in found], limit)
@@ -203,8 +199,7 @@ def whole(session: Session, job_id: str) -> Iterator[tuple[JobRequest, bytes | N
 
 def rename(session: Session, job_id: str, name: str | None, client: Client) -> JobView:
     """Gives a job a name, or none. Raises UnknownJob or NotOwner."""
-    job = _job(session, job_id, lock=True)
-    check_owner(client, job.owner)
+    job = _locked(session, job_id, client)
     job.name = name
     return view(session, job_id)
 
@@ -214,8 +209,7 @@ def cancel(session: Session, job_id: str, client: Client) -> None:
 
     Raises UnknownJob, NotOwner or JobNotCancellable.
     """
-    job = _job(session, job_id, lock=True)
-    check_owner(client, job.owner)
+    job = _locked(session, job_id, client)
     if job.state == "done":
         raise JobNotCancellable
     if job.state != "cancelled":
@@ -238,8 +232,7 @@ def stop(session: Session, job: Job, at: datetime) -> None:
 def retry(session: Session, job_id: str, client: Client, most_waiting: int) -> None:
     """Lets failed and cancelled requests wait again. Raises UnknownJob, NotOwner, TooManyWaiting or
     TooManyWaitingOfClient."""
-    job = _job(session, job_id, lock=True)
-    check_owner(client, job.owner)
+    job = _locked(session, job_id, client)
     again = select(JobRequest).where(
         JobRequest.job_id == job.id, JobRequest.state.in_(("failed", "cancelled"))
     )
@@ -257,8 +250,7 @@ def retry(session: Session, job_id: str, client: Client, most_waiting: int) -> N
 
 def delete(session: Session, job_id: str, client: Client) -> None:
     """Deletes a job, its requests, their answers and its events. Raises UnknownJob or NotOwner."""
-    job = _job(session, job_id)
-    check_owner(client, job.owner)
+    job = by_id(session, Job, job_id, UnknownJob, client)
     # in the order in which holders lock the rows of a job
     session.execute(
         select(JobRequest.number).where(JobRequest.job_id == job.id).with_for_update()
@@ -287,9 +279,9 @@ def _delete(session: Session, job_ids: list[str]) -> None:
     session.execute(delete_from(Answer).where(Answer.job_id.in_(job_ids)))
 
 
-def _job(session: Session, job_id: str, lock: bool = False) -> Job:
-    locking = {"key_share": True} if lock else None
-    return by_id(session, Job, job_id, UnknownJob, with_for_update=locking)
+def _locked(session: Session, job_id: str, client: Client) -> Job:
+    """A job whose row is locked, for a client to change it. Raises UnknownJob or NotOwner."""
+    return by_id(session, Job, job_id, UnknownJob, client, with_for_update={"key_share": True})
 
 
 def _check_room(session: Session, more: int, most_waiting: int, owner: str | None) -> None:

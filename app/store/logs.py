@@ -8,7 +8,7 @@ from sqlalchemy import delete as delete_from
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, defer
 
-from joulepath.app.access.client import Client, check_owner
+from joulepath.app.access.client import Client
 from joulepath.app.exceptions.stored import TooManyLogs, UnknownLog
 from joulepath.app.store.paging import having, page_of
 from joulepath.app.store.shares import room_of
@@ -31,9 +31,10 @@ def get(session: Session, log_id: str) -> StoredLog:
     return by_id(session, StoredLog, log_id, partial(UnknownLog, log_id))
 
 
-def about(session: Session, log_id: str) -> StoredLog:
-    """A log without its file. Raises UnknownLog."""
-    return by_id(session, StoredLog, log_id, partial(UnknownLog, log_id), options=[_LIGHT])
+def about(session: Session, log_id: str, client: Client | None = None) -> StoredLog:
+    """A log without its file, for a `client` to change it. Raises UnknownLog or NotOwner."""
+    unknown = partial(UnknownLog, log_id)
+    return by_id(session, StoredLog, log_id, unknown, client, options=[_LIGHT])
 
 
 def page(
@@ -42,22 +43,19 @@ def page(
     """Up to `limit` logs without their files, newest first, and the `after` of the next page; None
     on the last page. With a `search`, those that have this text in their name or robot.
     """
-    query = select(StoredLog).options(_LIGHT)
-    if search is not None:
-        query = query.where(having(search, StoredLog.name, StoredLog.robot))
+    found = having(search, StoredLog.name, StoredLog.robot)
+    query = select(StoredLog).where(found).options(_LIGHT)
     return page_of(session, query, StoredLog, limit, after)
 
 
 def rename(session: Session, log_id: str, name: str | None, client: Client) -> StoredLog:
     """Gives a log a name, or none. Raises UnknownLog or NotOwner."""
-    log = about(session, log_id)
-    check_owner(client, log.owner)
+    log = about(session, log_id, client)
     log.name = name
     return log
 
 
 def delete(session: Session, log_id: str, client: Client) -> None:
     """Deletes a log. Raises UnknownLog or NotOwner."""
-    log = about(session, log_id)
-    check_owner(client, log.owner)
+    log = about(session, log_id, client)
     session.execute(delete_from(StoredLog).where(StoredLog.id == log.id))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Any, TypeVar, TypeVarTuple
 
-from sqlalchemy import ColumnElement, Select, and_, or_
+from sqlalchemy import ColumnElement, Select, and_, or_, true
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from joulepath.app.store.tables import Answer, Job, StoredLog, Study
@@ -54,6 +54,8 @@ def following(rows: Sequence[Listed], limit: int) -> str | None:
     return f"{(last.created - _EPOCH) // _MICROSECOND}_{last.id}"
 
 
-def having(text: str, *places: InstrumentedAttribute[Any]) -> ColumnElement[bool]:
-    """Whether a text is in one of the columns, in upper or lower case."""
+def having(text: str | None, *places: InstrumentedAttribute[Any]) -> ColumnElement[bool]:
+    """Whether a text is in one of the columns, in upper or lower case; None is everywhere."""
+    if text is None:
+        return true()
     return or_(*(each.icontains(text, autoescape=True) for each in places))

@@ -9,7 +9,7 @@ from sqlalchemy import delete as delete_from
 from sqlalchemy import select
 from sqlalchemy.orm import Session, defer
 
-from joulepath.app.access.client import Client, check_owner
+from joulepath.app.access.client import Client
 from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions.stored import KeyReused, UnknownIteration, UnknownStudy
 from joulepath.app.store import answers, cache
@@ -110,23 +110,21 @@ def page(
 ) -> tuple[list[State], str | None]:
     """Up to `limit` studies, newest first, and the `after` of the next page; None on the last
     page. With a `search`, those that have this text in their name or robot."""
-    query = select(Study)
-    if search is not None:
-        query = query.where(having(search, Study.name, Study.robot))
+    query = select(Study).where(having(search, Study.name, Study.robot))
     studies, following = page_of(session, query, Study, limit, after)
     return [_state(session, study) for study in studies], following
 
 
 def rename(session: Session, study_id: str, name: str, client: Client) -> State:
     """Gives a study another name. Raises UnknownStudy or NotOwner."""
-    study = _of_client(session, study_id, client)
+    study = _study(session, study_id, client)
     study.name = name
     return _state(session, study)
 
 
 def delete(session: Session, study_id: str, client: Client) -> None:
     """Deletes a study, its iterations and their answers. Raises UnknownStudy or NotOwner."""
-    study = _of_client(session, study_id, client)
+    study = _study(session, study_id, client)
     session.execute(delete_from(Study).where(Study.id == study.id))
 
 
@@ -157,7 +155,7 @@ def add(
 
     Raises UnknownStudy, NotOwner or KeyReused.
     """
-    _of_client(session, study_id, client)
+    _study(session, study_id, client)
     # Lock the study in PostgreSQL, so that numbers have no gaps; SQLite has only one writer.
     study = session.scalar(select(Study).where(Study.id == study_id).with_for_update())
     if study is None:
@@ -232,14 +230,8 @@ def new_study(
     )
 
 
-def _study(session: Session, study_id: str) -> Study:
-    return by_id(session, Study, study_id, UnknownStudy)
-
-
-def _of_client(session: Session, study_id: str, client: Client) -> Study:
-    study = _study(session, study_id)
-    check_owner(client, study.owner)
-    return study
+def _study(session: Session, study_id: str, client: Client | None = None) -> Study:
+    return by_id(session, Study, study_id, UnknownStudy, client)
 
 
 def _state(session: Session, study: Study) -> State:

@@ -25,11 +25,10 @@ from sqlalchemy import (
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import DeclarativeBase, Mapped, Session, mapped_column
 
-from joulepath.app.schemas.lengths import (
-    LENGTHS,
-)
+from joulepath.app.access.client import Client, check_owner
+from joulepath.app.schemas.lengths import LENGTHS
 
-T = TypeVar("T", bound="Table")
+T = TypeVar("T", bound="Owned")
 # SQLite can alter a constraint only if it has a name
 _NAMES = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -56,20 +55,28 @@ def new_id() -> str:
 
 
 def by_id(
-    session: Session, table: type[T], id: str, unknown: Callable[[], Exception], **how: Any
+    session: Session,
+    table: type[T],
+    id: str,
+    unknown: Callable[[], Exception],
+    client: Client | None = None,
+    **how: Any,
 ) -> T:
-    """The row with an id. Raises `unknown`.
+    """The row with an id. Raises `unknown`, and NotOwner if a client may not change it.
 
     Args:
         session: the session.
         table: the table, whose key is the id alone.
         id: the id, or any other text; PostgreSQL rejects some other texts with an error.
         unknown: makes the error if there is no such row.
+        client: who wants to change the row; None: it is only read.
         how: options of `Session.get`.
     """
     row = session.get(table, id, **how) if re.fullmatch(r"[0-9a-f-]{36}", id) else None
     if row is None:
         raise unknown()
+    if client is not None:
+        check_owner(client, row.owner)
     return row
 
 
@@ -101,19 +108,26 @@ class Table(DeclarativeBase):
     metadata = MetaData(naming_convention=_NAMES)
 
 
-class Study(Table):
+class Owned(Table):
+    """A table of the objects of clients."""
+
+    __abstract__ = True
+
+    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
+    created: Mapped[datetime] = mapped_column(Instant)
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
+
+
+class Study(Owned):
     """Iterative improvement of a motion until its energy is at most `threshold` [J]."""
 
     __tablename__ = "studies"
     __table_args__ = (Index(None, "created", "id"),)
 
-    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
     name: Mapped[str] = mapped_column(String(LENGTHS.name))
     robot: Mapped[str] = mapped_column(String(LENGTHS.robot))
     objective: Mapped[str] = mapped_column(String(32))
     threshold: Mapped[float]
-    created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     idempotency_key: Mapped[str | None] = mapped_column(String(LENGTHS.key), unique=True)
     figures: Mapped[str | None] = mapped_column(String(LENGTHS.id))
     """Id of the figures of all iterations; null for the robot's own."""
@@ -131,18 +145,15 @@ class OwnRobot(Table):
     warnings: Mapped[list[str]] = mapped_column(JSON)
 
 
-class StoredLog(Table):
+class StoredLog(Owned):
     """A log of one arm: the file of the user, packed with gzip, and the `settings` of its
     reader."""
 
     __tablename__ = "logs"
     __table_args__ = (Index(None, "created", "id"),)
 
-    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
     name: Mapped[str | None] = mapped_column(String(LENGTHS.name))
     robot: Mapped[str] = mapped_column(String(LENGTHS.robot))
-    created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     settings: Mapped[dict[str, Any]] = mapped_column(JSON)
     report: Mapped[dict[str, Any]] = mapped_column(JSON)
     """Fields of the report without a column of their own."""
@@ -151,21 +162,20 @@ class StoredLog(Table):
     body: Mapped[bytes] = mapped_column(LargeBinary)
 
 
-class Figures(Table):
-    """Figures identified on one arm, replacing the robot's own."""
+class Figures(Owned):
+    """Figures identified on one arm, replacing the robot's own.
+
+    The id is made of robot and content: the same figures have the same id on every server.
+    """
 
     __tablename__ = "figures"
     __table_args__ = (Index(None, "created", "id"),)
 
-    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
-    """Made of robot and content: the same figures have the same id on every server."""
     robot: Mapped[str] = mapped_column(String(LENGTHS.robot))
-    created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     content: Mapped[dict[str, Any]] = mapped_column(JSON)
 
 
-class Answer(Table):
+class Answer(Owned):
     """A complete answer of an endpoint: JSON, compressed. An answer of a study or job is deleted
     with it, any other by age and total size."""
 
@@ -179,10 +189,7 @@ class Answer(Table):
         Index(None, "job_id"),
     )
 
-    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
     kind: Mapped[str] = mapped_column(String(32))
-    created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     study_id: Mapped[str | None] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"))
     job_id: Mapped[str | None] = mapped_column(String(LENGTHS.id))
     """Whoever deletes a job deletes its answers."""
@@ -260,7 +267,7 @@ class Iteration(Table):
     idempotency_key: Mapped[str | None] = mapped_column(String(LENGTHS.key))
 
 
-class Job(Table):
+class Job(Owned):
     """Requests computed one by one without a waiting client.
 
     `state` is `waiting`, `running`, `done` (every request has ended), `cancelling` or `cancelled`.
@@ -269,13 +276,10 @@ class Job(Table):
     __tablename__ = "jobs"
     __table_args__ = (Index(None, "created", "id"), Index(None, "ended"))
 
-    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
     name: Mapped[str | None] = mapped_column(String(LENGTHS.name))
     state: Mapped[str] = mapped_column(String(16))
-    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     keep_going: Mapped[bool]
     """Whether the other requests go on after one has failed."""
-    created: Mapped[datetime] = mapped_column(Instant)
     started: Mapped[datetime | None] = mapped_column(Instant)
     ended: Mapped[datetime | None] = mapped_column(Instant)
     total: Mapped[int]
