@@ -21,7 +21,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from joulepath.app.answers.declared import with_unit
-from joulepath.app.schemas.examples.values import ANSWER_ID, REQUEST_ID, TURNED
+from joulepath.app.schemas.examples.values import TURNED
 from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.app.schemas.names import TYPOS, nearest
 from joulepath.app.schemas.unknown_fields import without_unknown_fields
@@ -75,32 +75,6 @@ class Response(BaseModel):
     """A part of an answer: every field is always present."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
-
-
-class Answer(Response):
-    """The fields of every answer about a robot."""
-
-    request: str = described(
-        "Id of the request, as in the header `X-Request-ID`.", None, REQUEST_ID
-    )
-    id: str | None = described(
-        "Id of this answer: `GET /answers/{id}` returns it again, and exports and replays take "
-        "it. Null if it is not stored.",
-        None,
-        ANSWER_ID,
-    )
-    robot: str = described("Name of the robot.", None, "ur5e")
-
-
-class MotionAnswer(Answer):
-    """The fields of an answer that is a motion."""
-
-    arm: dict[str, Any] | None = described(
-        "Fields of the request on the arm, without its robot: payload, limits, scene, ... as "
-        "sent. Null if they are larger than 64 KiB of JSON.",
-        None,
-        {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
-    )
 
 
 def by_field(
