@@ -22,6 +22,7 @@ from joulepath.models.uploads.limits import unwatched
 from joulepath.models.uploads.mesh import read_mesh
 from joulepath.models.uploads.mesh_text import MeshSize
 
+_FILE_KINDS = ("obj", "stl", "dae")
 # detailed surfaces for display, and the maker's coarser surfaces for collision checks
 KINDS = ("visual", "collision")
 # shifts [m] of the meshes of upper arm, forearm and wrists along the joint axis, the only
@@ -134,39 +135,21 @@ def sampled(triangles: Array, count: int, rng: np.random.Generator) -> Array:
     return np.asarray(triangles[chosen, 0] + (shares * sides[chosen]).sum(axis=1))
 
 
-def _triangles(path: Path) -> Array:
-    """Triangles (t, 3, 3) of a Wavefront OBJ file; its polygons are cut into fans."""
-    vertices, faces = [], []
-    for line in path.read_text(encoding="utf-8").splitlines():
-        kind, *rest = line.split() or [""]
-        if kind == "v":
-            vertices.append([float(x) for x in rest[:3]])
-        elif kind == "f":
-            # `vertex/texture/normal`, numbered from 1: only the vertex counts.
-            corners = [int(corner.split("/")[0]) - 1 for corner in rest]
-            faces += [[corners[0], *corners[k : k + 2]] for k in range(1, len(corners) - 1)]
-    return np.asarray(np.array(vertices)[np.array(faces)])
-
-
 def surface(stem: Path) -> Array:
     """Triangles (t, 3, 3) of the mesh file with this path, whatever its suffix is; of a COLLADA
     file, those of its convex hull.
     """
-    for suffix, read in _READERS.items():
-        for written in (suffix, suffix.upper()):
-            if (path := stem.with_suffix(written)).is_file():
-                return read(path)
-    raise FileNotFoundError(f"no mesh {stem} as {', '.join(_READERS)}")
+    for kind in _FILE_KINDS:
+        for suffix in (f".{kind}", f".{kind.upper()}"):
+            if (path := stem.with_suffix(suffix)).is_file():
+                return _triangles(kind, path.read_bytes())
+    raise FileNotFoundError(f"no mesh {stem} as {', '.join(_FILE_KINDS)}")
 
 
-def _stl(path: Path) -> Array:
-    corners, triangles = read_mesh("stl", path.read_bytes(), MeshSize())
+def _triangles(kind: str, content: bytes) -> Array:
+    if kind == "dae":
+        corners = collada_corners(content, MeshSize(), unwatched)
+        triangles = ConvexHull(corners).simplices
+    else:
+        corners, triangles = read_mesh(kind, content, MeshSize())
     return np.asarray(corners[triangles])
-
-
-def _hull_of_dae(path: Path) -> Array:
-    corners = collada_corners(path.read_bytes(), MeshSize(), unwatched)
-    return np.asarray(corners[ConvexHull(corners).simplices])
-
-
-_READERS = {".obj": _triangles, ".stl": _stl, ".dae": _hull_of_dae}
