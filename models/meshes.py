@@ -149,7 +149,6 @@ def surface(stem: Path) -> Array:
 def _triangles(kind: str, content: bytes) -> Array:
     if kind == "dae":
         corners = collada_corners(content, MeshSize(), unwatched)
-        triangles = ConvexHull(corners).simplices
-    else:
-        corners, triangles = read_mesh(kind, content, MeshSize())
+        return np.asarray(corners[ConvexHull(corners).simplices])
+    corners, triangles = read_mesh(kind, content, MeshSize())
     return np.asarray(corners[triangles])
