@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import zlib
-
 import zstandard
 
 _LEVEL = 1
 """Of Zstandard: on documents of numbers its higher levels are slower, and no smaller."""
-_ZSTANDARD = zstandard.FRAME_HEADER
 
 
 def packed(document: bytes) -> bytes:
@@ -18,7 +15,5 @@ def packed(document: bytes) -> bytes:
 
 
 def unpacked(kept: bytes) -> bytes:
-    """The document. Earlier versions of the service compressed with zlib."""
-    if kept.startswith(_ZSTANDARD):
-        return zstandard.ZstdDecompressor().decompress(kept)
-    return zlib.decompress(kept)
+    """The document."""
+    return zstandard.ZstdDecompressor().decompress(kept)
