@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -116,15 +115,15 @@ _MOTION = (
 
 
 def to_program(
-    answer: dict[str, Any], arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]
+    answer: dict[str, Any], arm: ArmRequest | None, moves: list[dict[str, Any]]
 ) -> Program:
     """The motion of an answer at full speed, with validated samples.
 
-    `kept` returns the kept answers of paths, such as the moves of a cycle. Raises ValidationError
-    (of pydantic), InvalidRequest, InvalidProblem, NotCertified or UnknownRobot.
+    `moves` are the answers of a cycle's moves. Raises ValidationError (of pydantic),
+    InvalidRequest, InvalidProblem, NotCertified or UnknownRobot.
     """
     if "legs" in answer:
-        return _cycle(_Cycle.model_validate(answer), arm, kept)
+        return _cycle(_Cycle.model_validate(answer), arm, moves)
     if "trajectory" in answer or "samples" in answer:
         return Program((_move(answer, arm, "move"),))
     if _A_FRONT in answer:
@@ -171,20 +170,17 @@ def paths_of_moves(answer: dict[str, Any]) -> list[str]:
     return [leg.answer for leg in legs if leg.answer is not None]
 
 
-def _cycle(
-    found: _Cycle, arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]
-) -> Program:
+def _cycle(found: _Cycle, arm: ArmRequest | None, moves: list[dict[str, Any]]) -> Program:
     if arm is not None:
         raise InvalidProblem("arm", "The moves of a cycle have arms of their own: leave `arm` out.")
-    answers = kept([leg.answer for leg in found.legs if leg.answer is not None])
-    moves, steps = iter(answers), list[Move | Rest]()
+    answers, steps = iter(moves), list[Move | Rest]()
     for leg in found.legs:
         if leg.kind in MOVING:
-            steps.append(_move(next(moves), None, f"{leg.start.stop} to {leg.goal.stop}"))
+            steps.append(_move(next(answers), None, f"{leg.start.stop} to {leg.goal.stop}"))
         else:
             steps.append(Rest(leg.duration, f"{leg.kind} at {leg.goal.stop}"))
     if found.payload_at_end is not None:
-        left = arm_of({}, answers[-1], payload=found.payload_at_end).payload
+        left = arm_of({}, moves[-1], payload=found.payload_at_end).payload
         steps = with_payload_at_end(steps, left)
     return Program(tuple(steps))
 

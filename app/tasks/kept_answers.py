@@ -9,6 +9,7 @@ from typing import Any
 
 import orjson
 
+from joulepath.app.convert.given_answer import paths_of_moves
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import PartsNeeded
 from joulepath.optimizer.context_value import assigned
@@ -30,6 +31,15 @@ def kept_answers(names: list[str]) -> list[Any]:
     if missing:
         raise PartsNeeded(missing)
     return [_document(kept[name]) for name in names]
+
+
+def answer_and_moves(given: str | dict[str, Any]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """An answer, given or kept under an id, and the kept answers of a cycle's moves.
+
+    Raises as `kept_answers` and `paths_of_moves`.
+    """
+    answer = kept_answers([given])[0] if isinstance(given, str) else given
+    return answer, kept_answers(paths_of_moves(answer))
 
 
 def _document(body: bytes) -> Any:

@@ -15,7 +15,7 @@ from joulepath.app.convert.fields import inside
 from joulepath.app.convert.given_answer import paths_of_moves
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.tasks.kept_answers import kept_answers
+from joulepath.app.tasks.kept_answers import answer_and_moves
 from joulepath.optimizer.exceptions import InvalidProblem
 
 Json = dict[str, Any]
@@ -38,14 +38,14 @@ def answered(asked: AnsweredRequest, request_id: str, deadline: float) -> tuple[
     if asked.answer is None:
         with inside("cycle" if isinstance(task, CycleRequest) else "optimize"):
             return documents_of(result_of(task, request_id, deadline))
-    answer = kept_answers([asked.answer])[0]
+    answer, moves = answer_and_moves(asked.answer)
     if not _fits(answer, task):
         raise InvalidProblem(
             "answer",
             "The stored answer belongs to another request: leave `answer` out, or "
             "send that request.",
         )
-    return answer, kept_answers(paths_of_moves(answer))
+    return answer, moves
 
 
 def _fits(answer: Json, task: OptimizeRequest | CycleRequest) -> bool:

@@ -8,15 +8,14 @@ from dataclasses import dataclass, field
 from pydantic import ValidationError
 
 from joulepath.app.api.export.request import ExportRequest, to_options
-from joulepath.app.convert.given_answer import paths_of_moves, to_program
+from joulepath.app.convert.given_answer import to_program
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.problems import invalid_request
-from joulepath.app.tasks.kept_answers import kept_answers
+from joulepath.app.tasks.kept_answers import answer_and_moves
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.export.export import export
 from joulepath.optimizer.export.formats import FormatName
-from joulepath.optimizer.export.program import Program
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,8 @@ class ExportTask:
         options = to_options(self.asked, self.format, "json" if self.as_json else "yaml")
         try:
             with until(end):
-                program = self._program()
+                answer, moves = answer_and_moves(self.asked.answer)
+                program = to_program(answer, self.asked.arm, moves)
         except ValidationError as error:
             raise invalid_request(error, "body", "answer") from None
         speed_scale = self.asked.speed_scale
@@ -61,9 +61,3 @@ class ExportTask:
             worst_ratio=file.worst_ratio,
             notes=file.notes,
         )
-
-    def _program(self) -> Program:
-        given = self.asked.answer
-        answer = kept_answers([given])[0] if isinstance(given, str) else given
-        kept_answers(paths_of_moves(answer))
-        return to_program(answer, self.asked.arm, kept_answers)

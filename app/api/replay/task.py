@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from joulepath.app.answers.envelope import Answer
-from joulepath.app.convert.given_answer import Number, Part, paths_of_moves, to_program
+from joulepath.app.convert.given_answer import Number, Part, to_program
 from joulepath.app.convert.until import until
 from joulepath.app.convert.warnings import replay_warnings
 from joulepath.app.engine.listening import listener
@@ -18,7 +18,7 @@ from joulepath.app.http.problems import invalid_request
 from joulepath.app.schemas.common import Request, described
 from joulepath.app.schemas.deadline import DeadlineSeconds
 from joulepath.app.schemas.given_answer import AnswerRequest
-from joulepath.app.tasks.kept_answers import kept_answers
+from joulepath.app.tasks.kept_answers import answer_and_moves
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.declared import NotEmpty, Seconds
 from joulepath.optimizer.export.program import Move
@@ -169,16 +169,14 @@ class ReplayTask:
 
     def _planned(self) -> list[tuple[int | None, PlannedMotion]]:
         """The motions of the answer, with their indices in `legs` of a cycle."""
-        given = self.asked.answer
-        answer = kept_answers([given])[0] if isinstance(given, str) else given
-        paths = paths_of_moves(answer)
-        single = kept_answers(paths) if paths else [answer]
-        moves = to_program(answer, self.asked.arm, kept_answers).moves
+        answer, of_moves = answer_and_moves(self.asked.answer)
+        moves = to_program(answer, self.asked.arm, of_moves).moves
         legs: list[int | None] = [None]
-        if paths:
+        if of_moves:
             legs = [k for k, leg in enumerate(answer["legs"]) if leg["answer"] is not None]
         return [
-            (leg, to_planned_motion(*each)) for leg, *each in zip(legs, moves, single, strict=True)
+            (leg, to_planned_motion(move, given))
+            for leg, move, given in zip(legs, moves, of_moves or [answer], strict=True)
         ]
 
     def _replayed(

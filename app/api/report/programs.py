@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from joulepath.app.api.report.bundle import Bundle
-from joulepath.app.convert.given_answer import arm_fields_of, paths_of_moves, to_program
+from joulepath.app.convert.given_answer import arm_fields_of, to_program
 from joulepath.optimizer.export.program import Program
 
 Json = dict[str, Any]
@@ -17,12 +17,11 @@ def program_of(bundle: Bundle) -> Program:
     """
     if bundle.kind == "optimize":
         return program_of_motion(bundle.request, bundle.answer)
-    moves = dict(zip(paths_of_moves(bundle.answer), bundle.moves, strict=True))
-    return to_program(bundle.answer, None, lambda names: [moves[name] for name in names])
+    return to_program(bundle.answer, None, bundle.moves)
 
 
 def program_of_motion(request: Json, answer: Json) -> Program:
     """The motion of an answer of `POST /optimize`. Raises as `program_of`."""
     # where the arm is too large to be repeated, the request has it
     own = None if answer.get("arm") is not None else arm_fields_of(request)
-    return to_program(answer, own, lambda _: [])
+    return to_program(answer, own, [])
