@@ -15,9 +15,9 @@ import orjson
 
 from joulepath.app.cli import terminal
 from joulepath.app.cli.exit_codes import of_error
+from joulepath.app.cli.store import robot_named, run_with_store
 
 if TYPE_CHECKING:
-    from joulepath.app.engine.result import TaskResult
     from joulepath.app.engine.task import Task
     from joulepath.app.schemas.common import Request
 
@@ -40,26 +40,6 @@ MOVES: Callable[[Any], Any] = click.option(
 )
 
 
-class Refused(Exception):
-    """The request is answered with a problem.
-
-    Attributes:
-        problem: its JSON (RFC 9457).
-        exit_code: exit code of the command.
-        remedy: what to do, in words.
-    """
-
-    def __init__(self, problem: bytes, exit_code: int, remedy: str = "") -> None:
-        super().__init__(problem)
-        self.problem, self.exit_code, self.remedy = problem, exit_code, remedy
-
-    def shown(self) -> bytes:
-        """What standard error shows: words on a terminal, else the JSON."""
-        if not sys.stderr.isatty():
-            return self.problem
-        return terminal.problem(orjson.loads(self.problem), self.remedy).encode()
-
-
 def new_id() -> str:
     """An id for a request: its answer or its problem holds it."""
     return str(uuid.uuid4())
@@ -70,8 +50,8 @@ def content_of(file: str) -> bytes:
     return sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes()
 
 
-def validated(model: type[M], body: bytes, request_id: str) -> M:
-    """The request in a JSON body. Raises Refused."""
+def validated(model: type[M], body: bytes) -> M:
+    """The request in a JSON body. Raises InvalidRequest."""
     from pydantic import ValidationError
 
     from joulepath.app.convert.json_text import parsed_json
@@ -82,47 +62,40 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
 
     try:
         asked = model.model_validate(parsed_json(body))
-        if wrong := too_long(given_deadline(asked), LONGEST_DEADLINE, "body"):
-            raise InvalidRequest(wrong)
-        return asked
-    except InvalidRequest as error:
-        raise refused(error, request_id) from None
     except ValidationError as error:
-        raise refused(invalid_request(error, "body"), request_id) from None
+        raise invalid_request(error, "body") from None
+    if wrong := too_long(given_deadline(asked), LONGEST_DEADLINE, "body"):
+        raise InvalidRequest(wrong)
+    return asked
 
 
-def answered(task: Task, deadline: float, request_id: str, answers: Path | None = None) -> bytes:
-    """The answer of a task in at most `deadline` [s], with the answers of moves in a folder.
-
-    Raises Refused.
-    """
-    result = result_of(task, deadline, request_id, answers)
+def answered(task: Task, deadline: float, answers: Path | None = None) -> bytes:
+    """The answer of a task in at most `deadline` [s], with the answers of moves in a folder."""
+    result = run_with_store(task, deadline, answers)
     return (result if result.kept_as is None else result.not_kept()).document
 
 
-def result_of(
-    task: Task, deadline: float, request_id: str, answers: Path | None = None
-) -> TaskResult:
-    """The result of a task in at most `deadline` [s], with the answers of moves in a folder.
-
-    Raises Refused.
+def show_problem(error: Exception) -> int:
+    """Writes an error to standard error: in words on a terminal, else as a problem in JSON (RFC
+    9457). Returns the exit code; raises an unforeseen error again.
     """
-    from joulepath.app.cli.store import run_with_store
-    from joulepath.optimizer.exceptions import DeclaredError
-
-    try:
-        return run_with_store(task, deadline, answers)
-    except DeclaredError as error:
-        raise refused(error, request_id) from None
-
-
-def refused(error: Exception, request_id: str | None = None) -> Refused:
-    """The exception of a command for an error of the library or the service."""
+    from joulepath.app.client.errors import ServiceUnreachable
     from joulepath.app.engine.result import json_document
     from joulepath.app.http.problems import problem_of, reported
+    from joulepath.optimizer.exceptions import DeclaredError
 
-    document = json_document(problem_of(error, request_id or new_id()))
-    return Refused(document, of_error(error), reported(error).remedy)
+    if not isinstance(error, DeclaredError):
+        raise error
+    if isinstance(error, ServiceUnreachable):
+        remedy = ""
+        problem = {"type": "about:blank", "title": "Service unreachable", "detail": str(error)}
+    else:
+        remedy, problem = reported(error).remedy, problem_of(error, new_id())
+    shown = json_document(problem)
+    if sys.stderr.isatty():
+        shown = terminal.problem(orjson.loads(shown), remedy).encode()
+    click.echo(shown, err=True)
+    return of_error(error)
 
 
 def compile_kernel_of(robot_name: str) -> None:
@@ -131,7 +104,6 @@ def compile_kernel_of(robot_name: str) -> None:
     Without a C compiler, or for an unknown robot, nothing happens. A hanging compiler is reported
     and given up.
     """
-    from joulepath.app.cli.store import robot_named
     from joulepath.app.exceptions.stored import StoreUnavailable
     from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
     from joulepath.optimizer.exceptions import UnknownRobot

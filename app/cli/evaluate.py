@@ -107,11 +107,9 @@ def _answer(file: str, kind: Kind, fields: dict[str, Any], wanted: Kind, deadlin
 
     # in the form of the query of POST /evaluate: JSON values
     query = {name: orjson.dumps(value).decode() for name, value in fields.items()}
-    request_id = new_id()
     with terminal.steps(f"Evaluating for at most {deadline:g} s"):
-        return answered(
-            EvaluateTask(file, kind, query, wanted, request_id, deadline), deadline, request_id
-        )
+        task = EvaluateTask(file, kind, query, wanted, new_id(), deadline)
+        return answered(task, deadline)
 
 
 def settings_in(file: Path) -> dict[str, Any]:

@@ -15,10 +15,10 @@ from joulepath.app.cli.answer import (
     OUTPUT,
     content_of,
     new_id,
-    result_of,
     validated,
     write,
 )
+from joulepath.app.cli.store import run_with_store
 from joulepath.optimizer.export.formats import FORMAT_NAMES, FormatName
 
 # longest wall time of an export [s]; usual ones take milliseconds
@@ -68,7 +68,7 @@ def export(
     from joulepath.app.api.export.request import ExportRequest, option_field
     from joulepath.app.api.export.task import ExportResult, ExportTask
 
-    request_id, given, own = new_id(), _given(options), option_field(format)
+    given, own = _given(options), option_field(format)
     if given and own is None:
         raise click.UsageError(f"The format {format} has no options.")
     beside = {own: given} if given else {}
@@ -79,10 +79,10 @@ def export(
             b",%b:%b" % (orjson.dumps(name), orjson.dumps(value)) for name, value in beside.items()
         ),
     )
-    request = validated(ExportRequest, body, request_id)
+    request = validated(ExportRequest, body)
     with terminal.steps("Certifying the motion"):
-        task = ExportTask(request, format, False, request_id)
-        result = result_of(task, EXPORT_DEADLINE, request_id, answers)
+        task = ExportTask(request, format, False, new_id())
+        result = run_with_store(task, EXPORT_DEADLINE, answers)
     write(result.document, output)
     assert isinstance(result, ExportResult)
     notes = result.notes

@@ -150,14 +150,14 @@ def identify(
     to `PUT /figures`.
     """
     from joulepath.app.api.identifications.request import IdentifyRequest
+    from joulepath.app.api.identifications.task import IdentifyTask
 
-    request_id = new_id()
     unseen = [each for each in others if isinstance(each, Path)]
     if len(others) > max(1, len(unseen)):
         raise click.UsageError("--validate takes files, or one fraction, or moves.")
     carried = None if payload is None else {"mass": payload, "com": list(com)}
     settings = given_fields(LOGGED, options) | {"payload": carried, "gravity": gravity}
-    read = tuple(read_log_file(settings, file, request_id) for file in (*logs, *unseen))
+    read = tuple(read_log_file(settings, file) for file in (*logs, *unseen))
     body = given_fields(FITTED, options) | {
         "logs": [FILE_ID] * len(logs),
         "inertials": "automatic" if refit is None else "refit" if refit else "keep",
@@ -168,9 +168,9 @@ def identify(
         (only, *_) = others
         by = {"fraction": only} if isinstance(only, float) else only
         body["validate"] = [FILE_ID] * len(unseen) or by
-    asked = validated(IdentifyRequest, _json(body), request_id)
+    asked = validated(IdentifyRequest, _json(body))
     with terminal.steps(f"Identifying from {len(logs)} log{'s' if len(logs) > 1 else ''}"):
-        answer = _answered(asked, read, request_id)
+        answer = answered(IdentifyTask(asked, read, new_id()), asked.deadline)
     if wanted == "moves":
         write(moves_of(parsed(answer)).encode(), output)
         return
@@ -178,19 +178,15 @@ def identify(
     terminal.summary(lambda: summary_of(parsed(answer)))
 
 
-def _answered(asked: Any, read: Any, request_id: str) -> bytes:
-    from joulepath.app.api.identifications.task import IdentifyTask
-
-    return answered(IdentifyTask(asked, read, request_id), asked.deadline, request_id)
-
-
-def read_log_file(fields: dict[str, Any], file: Path, request_id: str) -> GivenLog:
-    """Checked settings of a log, as they are stored, and its packed file. Raises Refused."""
+def read_log_file(fields: dict[str, Any], file: Path) -> GivenLog:
+    """Checked settings of a log, as they are stored, and its packed file. Raises
+    InvalidRequest.
+    """
     from joulepath.app.api.logs.request import LogSettings
     from joulepath.app.convert.recorded import GivenLog
 
     named = _json(fields | {"name": file.stem[:80]})
-    settings = validated(LogSettings, named, request_id).model_dump(mode="json")
+    settings = validated(LogSettings, named).model_dump(mode="json")
     return GivenLog(FILE_ID, settings, _packed(file))
 
 

@@ -57,9 +57,8 @@ def ik(
     if pose is not None and "pose" not in pose:
         raise click.UsageError("--pose takes a pose: write it as 'p[x,y,z,rx,ry,rz]'.")
     needed = {"--pose": ("pose", None if pose is None else pose["pose"])}
-    request_id = new_id()
-    request = validated(IKRequest, body_of(file, {"robot": robot}, needed), request_id)
-    found = answered(IKTask(request, request_id, wanted), request.deadline, request_id)
+    request = validated(IKRequest, body_of(file, {"robot": robot}, needed))
+    found = answered(IKTask(request, new_id(), wanted), request.deadline)
     write(found, output)
     if wanted == "json":
         terminal.summary(lambda: summary_of(parsed(found)))
@@ -92,9 +91,8 @@ def ik_path(file: str, output: Path | None) -> None:
     """
     from joulepath.app.api.ik.path.task import IKPathRequest, IKPathTask
 
-    request_id = new_id()
-    request = validated(IKPathRequest, content_of(file), request_id)
-    found = answered(IKPathTask(request, request_id), request.deadline, request_id)
+    request = validated(IKPathRequest, content_of(file))
+    found = answered(IKPathTask(request, new_id()), request.deadline)
     write(found, output)
     terminal.summary(lambda: path_summary(parsed(found)))
 

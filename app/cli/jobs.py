@@ -11,7 +11,7 @@ import orjson
 
 from joulepath.app.cli.answer import FILE, OUTPUT, write
 from joulepath.app.cli.exit_codes import PROBLEM
-from joulepath.app.cli.service import SERVICE, answered, connect, json_of
+from joulepath.app.cli.service import SERVICE, connect, json_of
 from joulepath.app.cli.terminal import steps, table
 
 if TYPE_CHECKING:
@@ -41,8 +41,7 @@ def jobs(context: click.Context, url: str, key: str | None) -> None:
     """
     connect(context, url, key)
     if context.invoked_subcommand is None:
-        with answered():
-            rows = [_row(job) for job in context.obj.jobs()]
+        rows = [_row(job) for job in context.obj.jobs()]
         write(table([HEAD, *rows]).encode(), None)
 
 
@@ -62,8 +61,7 @@ def send(client: Client, file: str, wait: bool) -> int:
     body = json_of(file)
     if "requests" not in body:
         raise click.UsageError("FILE must hold the JSON of POST /jobs: an object with `requests`.")
-    with answered():
-        job = client.send_job(**body)
+    job = client.send_job(**body)
     write(job["id"].encode(), None)
     return _waited(client, job["id"]) if wait else 0
 
@@ -90,9 +88,7 @@ Example:
 @click.pass_obj
 def show(client: Client, id: str, output: Path | None) -> None:
     """Writes the job ID and its first requests as JSON."""
-    with answered():
-        job = client.job(id)
-    write(orjson.dumps(job), output)
+    write(orjson.dumps(client.job(id)), output)
 
 
 @jobs.command(
@@ -113,12 +109,11 @@ Example:
 @click.pass_obj
 def results(client: Client, id: str, output: Path | None, wanted: Literal["jsonl", "csv"]) -> None:
     """Writes the outcomes of the requests of the job ID."""
-    with answered():
-        content = (
-            client.job_table(id).encode()
-            if wanted == "csv"
-            else b"".join(orjson.dumps(each) + b"\n" for each in client.job_results(id))
-        )
+    content = (
+        client.job_table(id).encode()
+        if wanted == "csv"
+        else b"".join(orjson.dumps(each) + b"\n" for each in client.job_results(id))
+    )
     write(content, output)
 
 
@@ -128,8 +123,7 @@ def _changing(name: str, words: str) -> Callable[[Client, str], None]:
     @_ID
     @click.pass_obj
     def change(client: Client, id: str) -> None:
-        with answered():
-            job: dict[str, Any] = getattr(client, f"{name}_job")(id)
+        job: dict[str, Any] = getattr(client, f"{name}_job")(id)
         write(table([HEAD, _row(job)]).encode(), None)
 
     return jobs.command(
@@ -154,15 +148,14 @@ Example:
 @click.pass_obj
 def delete(client: Client, id: str) -> None:
     """Deletes the job ID with its answers."""
-    with answered():
-        client.delete_job(id)
+    client.delete_job(id)
 
 
 def _waited(client: Client, id: str) -> int:
     """Wait for the end of a job, with its progress on a terminal; returns the exit code."""
     from joulepath.optimizer.progress import StepsDone
 
-    with answered(), steps("Waiting for the job") as tell:
+    with steps("Waiting for the job") as tell:
         job = client.wait_for_job(
             id, PERIOD, lambda job: tell(StepsDone(100 * job["progress"], 100.0, "%"))
         )

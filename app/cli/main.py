@@ -7,7 +7,7 @@ import sys
 import click
 
 from joulepath import __version__
-from joulepath.app.cli.answer import Refused
+from joulepath.app.cli.answer import show_problem
 from joulepath.app.cli.evaluate import evaluate
 from joulepath.app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID, interruptible
 from joulepath.app.cli.export import export
@@ -98,13 +98,12 @@ def main() -> None:
     try:
         with interruptible():
             code = joulepath.main(prog_name="joulepath", standalone_mode=False) or ANSWERED
-    except Refused as refusal:
-        click.echo(refusal.shown(), err=True)
-        code = refusal.exit_code
     except click.ClickException as error:
         error.show()
         # click would return 1 for an unwritable file
         code = INVALID
     except (click.Abort, KeyboardInterrupt):
         code = INTERRUPTED
+    except Exception as error:
+        code = show_problem(error)
     sys.exit(code)

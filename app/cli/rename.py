@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from joulepath.app.cli.service import SERVICE, answered, connect
+from joulepath.app.cli.service import SERVICE, connect
 
 KINDS = ("answers", "jobs", "studies", "logs", "identifications", "robots")
 
@@ -30,5 +30,4 @@ def rename(
     This command needs a running service, and the extra `client` of the package.
     """
     connect(context, url, key)
-    with answered():
-        context.obj.rename(f"/{kind}/{id}", name)
+    context.obj.rename(f"/{kind}/{id}", name)

@@ -79,10 +79,10 @@ def replay(
     body = {"answer": _json(content_of(file), "FILE"), "perturb": dict(perturb) or None, **options}
     if arm is not None:
         body["arm"] = _json(arm.read_bytes(), "--arm")
-    request_id, deadline = new_id(), options["deadline"]
-    request = validated(ReplayRequest, orjson.dumps(body), request_id)
+    deadline = options["deadline"]
+    request = validated(ReplayRequest, orjson.dumps(body))
     with terminal.steps(f"Replaying for at most {deadline:g} s"):
-        found = answered(ReplayTask(request, request_id), deadline, request_id, answers)
+        found = answered(ReplayTask(request, new_id()), deadline, answers)
     write(found, output)
     terminal.summary(lambda: summary_of(parsed(found)))
 

@@ -15,13 +15,13 @@ from joulepath.app.cli.answer import (
     compile_kernel_of,
     content_of,
     new_id,
-    result_of,
     validated,
     write,
 )
 from joulepath.app.cli.evaluate import settings_in
 from joulepath.app.cli.exit_codes import ANSWERED, PROBLEM
 from joulepath.app.cli.identify import FILE_ID, read_log_file
+from joulepath.app.cli.store import run_with_store
 
 if TYPE_CHECKING:
     from joulepath.app.engine.task import Task
@@ -115,7 +115,6 @@ def report(
     is_log = file.lower().endswith((".csv", ".csv.gz"))
     if (robot or settings) and not is_log:
         raise click.UsageError("--robot and --settings are for a log as CSV.")
-    request_id = new_id()
     body = orjson.dumps({"log": FILE_ID}) if is_log else content_of(file).strip() or b"null"
     beside = {
         "format": format,
@@ -127,17 +126,17 @@ def report(
     }
     # the request stays as it is written, so that its problems name its own places
     whole = _whole(body, orjson.dumps(beside)[1:])
-    request = validated(ReportRequest, whole, request_id)
+    request = validated(ReportRequest, whole)
     if request.robot is not None:
         compile_kernel_of(request.robot)
-    task: Task = ReportTask(request, request_id)
+    task: Task = ReportTask(request, new_id())
     if is_log:
         fields = settings_in(settings) if settings is not None else {}
         fields |= {} if robot is None else {"robot": robot}
-        log = read_log_file(fields, Path(file), request_id)
+        log = read_log_file(fields, Path(file))
         task = Equipped(task, (partial(log_given, log),))
     with terminal.steps("Writing the report"):
-        result = result_of(task, request.with_advice, request_id)
+        result = run_with_store(task, request.with_advice)
     write(result.document, output)
 
 
@@ -170,12 +169,9 @@ def check(file: Path, no_answer: bool) -> int:
     from joulepath.app.api.report.bundle import NoReport
     from joulepath.app.api.report.check import CheckTask
 
-    request_id = new_id()
     try:
         with terminal.steps("Computing it again"):
-            result = result_of(
-                CheckTask(file.read_bytes(), not no_answer, request_id), 0, request_id
-            )
+            result = run_with_store(CheckTask(file.read_bytes(), not no_answer, new_id()), 0)
     except NoReport:
         raise click.UsageError(
             f"{file} is not a report of joulepath, or has no attached documents."

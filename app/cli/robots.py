@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from joulepath.app.cli.answer import OUTPUT, refused, write
+from joulepath.app.cli.answer import OUTPUT, write
 from joulepath.app.cli.store import in_store
 from joulepath.app.cli.terminal import table
 
@@ -55,7 +55,6 @@ def add(file: Path, name: str | None, replace: bool) -> None:
     """
     from joulepath.app.access.client import OPERATOR
     from joulepath.app.api.robots.request import NAME_PATTERN
-    from joulepath.app.exceptions.base import ServiceError
     from joulepath.app.settings import Settings
     from joulepath.app.store import robots as stored
     from joulepath.app.store.tables import OwnRobot, now
@@ -80,9 +79,7 @@ def add(file: Path, name: str | None, replace: bool) -> None:
             work = partial(stored.put, robot=row, most=most, client=OPERATOR)
         in_store(lambda store: store.write(work))
     except InvalidArm as error:
-        raise refused(InvalidProblem(error.field, str(error))) from None
-    except ServiceError as error:
-        raise refused(error) from None
+        raise InvalidProblem(error.field, str(error)) from None
     joints = len(figures["kinematics"]["joint_names"]["value"])
     write(
         "\n".join([f"{name}: {joints} joints. {energy_trust(figures)}", *warnings]).encode(), None
@@ -98,14 +95,9 @@ Example:
 def remove(name: str) -> None:
     """Deletes an added robot. Studies and stored answers about it stay."""
     from joulepath.app.access.client import OPERATOR
-    from joulepath.app.exceptions.base import ServiceError
     from joulepath.app.store import robots as stored
-    from joulepath.optimizer.exceptions import UnknownRobot
 
-    try:
-        in_store(lambda store: store.write(partial(stored.delete, name=name, client=OPERATOR)))
-    except (ServiceError, UnknownRobot) as error:
-        raise refused(error) from None
+    in_store(lambda store: store.write(partial(stored.delete, name=name, client=OPERATOR)))
 
 
 @robots.command(
@@ -155,23 +147,17 @@ def joint_limits(
     within them, and every payload up to the mass.
     """
     from joulepath.app.api.robots.joint_limits import proven_limits
-    from joulepath.optimizer.exceptions import JoulepathError
 
-    try:
-        found = proven_limits(_robot(robot), mass, distance)
-    except JoulepathError as error:
-        raise refused(error) from None
-    write(found.to_yaml(prefix).encode(), output)
+    write(proven_limits(_robot(robot), mass, distance).to_yaml(prefix).encode(), output)
 
 
 def _robot(robot: str) -> Robot:
-    """The robot of a name or of a file. Raises Refused or click.FileError."""
-    from joulepath.app.exceptions.base import ServiceError
+    """The robot of a name or of a file. Raises DeclaredError or click.FileError."""
     from joulepath.app.store import robots as stored
     from joulepath.models.own_arm.description import InvalidArm
     from joulepath.models.own_arm.robots import own_robot
     from joulepath.models.registry import robot_names
-    from joulepath.optimizer.exceptions import InvalidProblem, UnknownRobot
+    from joulepath.optimizer.exceptions import InvalidProblem
     from joulepath.optimizer.problem.robots import DESCRIPTIONS, load_robot
 
     try:
@@ -180,11 +166,9 @@ def _robot(robot: str) -> Robot:
         row = in_store(lambda store: store.read(partial(stored.get, name=robot)))
         return own_robot(robot, row.figures)
     except InvalidArm as error:
-        raise refused(InvalidProblem(error.field, str(error))) from None
+        raise InvalidProblem(error.field, str(error)) from None
     except OSError as error:
         raise click.FileError(robot, error.strerror or str(error)) from None
-    except (ServiceError, UnknownRobot) as error:
-        raise refused(error) from None
 
 
 def _table() -> str:

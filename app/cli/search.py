@@ -13,10 +13,10 @@ from joulepath.app.cli.answer import (
     compile_kernel_of,
     new_id,
     parsed,
-    result_of,
     validated,
     write,
 )
+from joulepath.app.cli.store import run_with_store
 from joulepath.optimizer.presentation.gap import gap_text
 
 if TYPE_CHECKING:
@@ -59,14 +59,13 @@ def search(
         answers: folder for the complete answers referenced by the answer.
 
     Raises:
-        Refused: there is no answer.
+        DeclaredError: there is no answer.
     """
-    request_id = new_id()
-    request: Any = validated(model, body, request_id)
+    request: Any = validated(model, body)
     deadline: float = request.deadline
     compile_kernel_of(robot_in(request))
     with terminal.steps(f"Optimising for at most {deadline:g} s"):
-        result = result_of(task(request, request_id), deadline, request_id)
+        result = run_with_store(task(request, new_id()), deadline)
     if result.kept_as is not None:
         result = result.not_kept()
     if answers is not None:

@@ -7,8 +7,6 @@ import os
 
 import click
 
-from joulepath.app.cli.answer import refused
-
 
 @click.command(
     epilog="""\b
@@ -90,7 +88,6 @@ def ros2(arguments: tuple[str, ...]) -> None:
     ARGUMENTS are those of any node: --ros-args, then parameters and remappings. Needs the packages
     of joulepath[ros2], or an installation of ROS 2.
     """
-    from joulepath.optimizer.exceptions import DeclaredError
     from joulepath.optimizer.presentation.extras import required
 
     try:
@@ -99,7 +96,4 @@ def ros2(arguments: tuple[str, ...]) -> None:
         raise click.ClickException(str(error)) from None
     from joulepath.app.ros2.node import main
 
-    try:
-        main(list(arguments))
-    except DeclaredError as error:
-        raise refused(error) from None
+    main(list(arguments))

@@ -1,16 +1,14 @@
-"""Common parts of commands for a running service: its address, its problems, request bodies."""
+"""Common parts of commands for a running service: its address, and request bodies."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 import click
 import orjson
 
-from joulepath.app.cli.answer import Refused, content_of, refused
-from joulepath.app.cli.exit_codes import PROBLEM
+from joulepath.app.cli.answer import content_of
 
 _URL = click.option(
     "--url",
@@ -33,25 +31,9 @@ def connect(context: click.Context, url: str, key: str | None) -> None:
     from joulepath.app.client.client import Client
 
     try:
-        with answered():
-            context.obj = context.with_resource(Client(url, key))
+        context.obj = context.with_resource(Client(url, key))
     except ModuleNotFoundError as error:
         raise click.UsageError(str(error)) from None
-
-
-@contextmanager
-def answered() -> Iterator[None]:
-    """Raises Refused for a problem of the service, or for an unreachable service."""
-    from joulepath.app.client.errors import ServiceUnreachable
-    from joulepath.optimizer.exceptions import DeclaredError
-
-    try:
-        yield
-    except ServiceUnreachable as error:
-        problem = {"type": "about:blank", "title": "Service unreachable", "detail": str(error)}
-        raise Refused(orjson.dumps(problem), PROBLEM) from None
-    except DeclaredError as error:
-        raise refused(error) from None
 
 
 def json_of(file: str) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import click
 import orjson
 
 from joulepath.app.cli.answer import FILE, OUTPUT, write
-from joulepath.app.cli.service import SERVICE, answered, connect, json_of
+from joulepath.app.cli.service import SERVICE, connect, json_of
 from joulepath.app.cli.terminal import table
 
 if TYPE_CHECKING:
@@ -39,8 +39,7 @@ def studies(context: click.Context, url: str, key: str | None) -> None:
     """
     connect(context, url, key)
     if context.invoked_subcommand is None:
-        with answered():
-            rows = [_row(study) for study in context.obj.studies()]
+        rows = [_row(study) for study in context.obj.studies()]
         write(table([HEAD, *rows]).encode(), None)
 
 
@@ -62,9 +61,7 @@ Example:
 @click.pass_obj
 def begin(client: Client, /, **given: Any) -> None:
     """Begins a study, and writes its id."""
-    with answered():
-        study = client.begin_study(**given)
-    write(study["id"].encode(), None)
+    write(client.begin_study(**given)["id"].encode(), None)
 
 
 @studies.command(
@@ -85,9 +82,7 @@ def add(client: Client, id: str, file: str, output: Path | None) -> None:
     """
     body = json_of(file)
     step = body if len(body) == 1 and next(iter(body)) in STEPS else {"optimize": body}
-    with answered():
-        made = client.add_iteration(id, step)
-    write(orjson.dumps(made), output)
+    write(orjson.dumps(client.add_iteration(id, step)), output)
 
 
 @studies.command(
@@ -107,10 +102,7 @@ Example:
 @click.pass_obj
 def show(client: Client, id: str, output: Path | None, wanted: Literal["json", "csv"]) -> None:
     """Writes the study ID with its history."""
-    with answered():
-        content = (
-            client.study_table(id).encode() if wanted == "csv" else orjson.dumps(client.study(id))
-        )
+    content = client.study_table(id).encode() if wanted == "csv" else orjson.dumps(client.study(id))
     write(content, output)
 
 
@@ -125,9 +117,7 @@ Example:
 def suggest(client: Client, id: str, output: Path | None) -> None:
     """Writes changes of the best motion of the study ID with less energy, and a request for `add`
     with every change."""
-    with answered():
-        found = client.suggestions(id)
-    write(orjson.dumps(found), output)
+    write(orjson.dumps(client.suggestions(id)), output)
 
 
 @studies.command(
@@ -139,8 +129,7 @@ Example:
 @click.pass_obj
 def delete(client: Client, id: str) -> None:
     """Deletes the study ID with its iterations and their answers."""
-    with answered():
-        client.delete_study(id)
+    client.delete_study(id)
 
 
 def _row(study: dict[str, Any]) -> tuple[str, ...]:

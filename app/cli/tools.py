@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from joulepath.app.cli.answer import refused, write
+from joulepath.app.cli.answer import write
 from joulepath.app.cli.terminal import table
 
 
@@ -25,7 +25,7 @@ def tools(name: str | None) -> None:
     from joulepath.optimizer.exceptions import UnknownTool
 
     if name is not None and name not in tool_names():
-        raise refused(UnknownTool(list(tool_names())))
+        raise UnknownTool(list(tool_names()))
     write((_list() if name is None else _figures(name)).encode(), None)
 
 
