@@ -31,7 +31,8 @@ from joulepath.models.own_arm.xacro_file import (
 _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 for _part in (Collision, Description, Drives, Electronics, Motion):
     _part.__pydantic_config__ = _STRICT  # type: ignore[union-attr]
-_DESCRIPTION = TypeAdapter(Description)
+DESCRIPTION = TypeAdapter(Description)
+"""Reads a description in JSON, without mesh files: these are bytes."""
 _MESSAGES = {
     "unexpected_keyword_argument": "A description has no such field: correct its name, or leave it "
     "out",
@@ -60,7 +61,7 @@ def read_description(path: Path) -> Description:
             for name in ("meshes", "packages", "arguments")
         )
         # The strict validator accepts JSON lists as tuples.
-        found = _DESCRIPTION.validate_json(json.dumps(data))
+        found = DESCRIPTION.validate_json(json.dumps(data))
     except (yaml.YAMLError, UnicodeDecodeError, TypeError) as error:
         raise InvalidArm("", f"{path.name} is not a description in YAML: {error}") from None
     except ValidationError as error:

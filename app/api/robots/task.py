@@ -4,8 +4,7 @@ of a user's arm.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 from joulepath.app.api.robots.request import OwnArm
 from joulepath.app.convert.fields import decoded, location
@@ -13,17 +12,10 @@ from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import FieldError, InvalidRequest
 from joulepath.app.http.problems import MOST_ERRORS
-from joulepath.models.own_arm.description import (
-    Collision,
-    Description,
-    Drives,
-    Electronics,
-    InvalidArm,
-    Motion,
-    PerJoint,
-)
+from joulepath.models.own_arm.description import Description, InvalidArm
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.mesh_files import in_zip
+from joulepath.models.own_arm.reading import DESCRIPTION
 from joulepath.models.own_arm.robots import own_robot
 from joulepath.optimizer.deadline import Deadline, checkpoint
 from joulepath.optimizer.exceptions import InvalidProblem
@@ -60,46 +52,6 @@ def invalid_arm(error: InvalidArm) -> InvalidRequest:
 def to_description(arm: OwnArm) -> Description:
     """The description of the library. Raises InvalidArm or InvalidProblem for meshes that are no
     zip, and DeadlinePassed once a watched deadline has passed."""
-    motion, collision = arm.default_motion, arm.collision
-    capsules = {name: tuple(map(_row, rows)) for name, rows in (collision.capsules or {}).items()}
-    pairs = (
-        None
-        if collision.never_meet is None
-        else tuple((first, second) for first, second in collision.never_meet)
-    )
-    return Description(
-        urdf=arm.urdf,
-        tip=arm.tip,
-        acceleration=_per_joint(arm.acceleration),
-        payload=arm.payload,
-        base=arm.base,
-        title=arm.title,
-        source=arm.source,
-        trust=arm.trust,
-        velocity=_per_joint(arm.velocity),
-        torque=_per_joint(arm.torque),
-        torque_side=arm.torque_side,
-        jerk=_per_joint(arm.jerk),
-        locked=arm.locked,
-        masses=arm.masses,
-        density=arm.density,
-        mend_inertias=arm.mend_inertias,
-        drives=Drives(**{name: _per_joint(value) for name, value in arm.drives}),
-        electronics=Electronics(**dict(arm.electronics)),
-        collision=Collision(capsules, collision.radius, pairs),
-        srdf=arm.srdf,
-        meshes=None if arm.meshes is None else in_zip(decoded(arm.meshes, "meshes"), checkpoint),
-        default_motion=None if motion is None else Motion(motion.velocity, motion.acceleration),
-    )
-
-
-def _required(value: float | list[float]) -> PerJoint:
-    return tuple(value) if isinstance(value, list) else value
-
-
-def _per_joint(value: float | list[float] | None) -> PerJoint | None:
-    return None if value is None else _required(value)
-
-
-def _row(row: list[float]) -> Any:
-    return tuple(row)
+    fields = arm.model_dump_json(exclude={"name", "meshes"})
+    meshes = None if arm.meshes is None else in_zip(decoded(arm.meshes, "meshes"), checkpoint)
+    return replace(DESCRIPTION.validate_json(fields), meshes=meshes)
