@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -106,7 +105,6 @@ def report(
     """
     from joulepath.app.api.report.request import ReportRequest
     from joulepath.app.api.report.task import ReportTask
-    from joulepath.app.convert.recorded import log_given
     from joulepath.app.tasks.arm_engine import Equipped
 
     format = output.suffix.removeprefix(".").lower()
@@ -134,7 +132,7 @@ def report(
         fields = settings_in(settings) if settings is not None else {}
         fields |= {} if robot is None else {"robot": robot}
         log = read_log_file(fields, Path(file))
-        task = Equipped(task, (partial(log_given, log),))
+        task = Equipped(task, {("log", log.id): log})
     with terminal.steps("Writing the report"):
         result = run_with_store(task, request.with_advice)
     write(result.document, output)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
+    from joulepath.app.convert.items import Key
     from joulepath.app.engine.result import TaskResult
     from joulepath.app.engine.task import Task
     from joulepath.app.store.store import Store
@@ -33,28 +34,26 @@ def run_with_store(task: Task, deadline: float, answers: Path | None = None) -> 
         DeclaredError: errors of the task.
         click.FileError: the folder cannot be read.
     """
-    from joulepath.app.exceptions.stored import PartsNeeded, UnknownFigures, UnknownLog
-    from joulepath.app.tasks.arm_engine import Equipped, Needs
-    from joulepath.app.tasks.kept_answers import answers_given
-    from joulepath.optimizer.exceptions import UnknownRobot
+    from joulepath.app.tasks.arm_engine import MISSING, Equipped, items_of, missing
 
-    if answers is not None:
-        task = Equipped(task, (partial(answers_given, _answers_in(answers)),))
-    needs, equipped = Needs(), task
+    items = {} if answers is None else _answers_in(answers)
     while True:
         try:
-            return equipped.run(deadline)
-        except (UnknownRobot, UnknownFigures, UnknownLog, PartsNeeded) as error:
-            needs = needs.after(error)
-        equipped = Equipped(task, in_store(needs.given))
+            return Equipped(task, items).run(deadline)
+        except MISSING as error:
+            keys = missing(error, items)
+        items |= in_store(partial(items_of, keys=keys))
 
 
-def _answers_in(folder: Path) -> dict[str, bytes]:
-    """The answers in a folder by their paths. Raises click.FileError."""
+def _answers_in(folder: Path) -> dict[Key, Any]:
+    """The answers in a folder. Raises click.FileError."""
     from joulepath.app.engine.result import path_of_answer
 
     try:
-        return {path_of_answer(file.stem): file.read_bytes() for file in folder.glob("*.json")}
+        return {
+            ("answer", path_of_answer(file.stem)): file.read_bytes()
+            for file in folder.glob("*.json")
+        }
     except OSError as error:
         raise click.FileError(str(folder), error.strerror or "") from None
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import orjson
 
+from joulepath.app.convert.items import item
 from joulepath.app.convert.pose import to_base
-from joulepath.app.convert.robots import own_figures_of, own_robot_of, with_figures
+from joulepath.app.convert.robots import own_robot_of, with_figures
 from joulepath.app.convert.scene import to_attachment, to_scene
 from joulepath.app.convert.tool import to_tcp, to_tool, with_tool
 from joulepath.app.schemas import arm as asked
@@ -38,7 +39,7 @@ def robot_named(name: str) -> Robot:
     """
     if name in robot_names():
         return load_robot(name)
-    figures = own_figures_of(name)
+    figures = item(("robot", name))
     if figures is None:
         raise UnknownRobot(name, list(robot_names()))
     return own_robot_of(name, figures)

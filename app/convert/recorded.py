@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
-from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,10 +9,10 @@ from typing import Any, TypeVar
 
 from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.convert.arm import inertia_row, robot_named, to_payload
+from joulepath.app.convert.items import item
 from joulepath.app.exceptions.stored import UnknownLog
 from joulepath.app.schemas.arm import Payload
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
-from joulepath.optimizer.context_value import assigned
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.errors import EffortNotUsable
 from joulepath.optimizer.identify.logs.log import Log
@@ -62,18 +60,10 @@ class GivenLog:
         )
 
 
-_LOG: ContextVar[GivenLog | None] = ContextVar("stored log", default=None)
-
-
-def log_given(log: GivenLog) -> AbstractContextManager[None]:
-    """Within the context, and its thread, requests may name this log."""
-    return assigned(_LOG, log)
-
-
 def stored_log(id: str) -> GivenLog:
     """The stored log of this id. Raises UnknownLog if the request did not bring it."""
-    log = _LOG.get()
-    if log is None or log.id != id:
+    log: GivenLog | None = item(("log", id))
+    if log is None:
         raise UnknownLog(id)
     return log
 

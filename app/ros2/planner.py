@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.client.client import Client
 from joulepath.app.convert.arm import robot_named, to_arm
-from joulepath.app.convert.robots import own_robot_named
+from joulepath.app.convert.items import given
 from joulepath.app.engine.result import json_document
 from joulepath.app.http.problems import invalid_request
 from joulepath.app.ros2.messages import Json
@@ -132,7 +132,7 @@ class LocalPlanner:
     def _known(self) -> AbstractContextManager[None]:
         if self._figures is None:
             return nullcontext()
-        return own_robot_named(self._name, self._figures)
+        return given({("robot", self._name): self._figures})
 
 
 class RemotePlanner:

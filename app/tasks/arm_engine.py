@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
 from joulepath.app.api.report.request import MOST_ROWS
-from joulepath.app.convert.recorded import GivenLog, log_given
-from joulepath.app.convert.robots import Identified, identified_as, own_robot_named, own_robot_of
+from joulepath.app.convert.items import Items, Key, given
+from joulepath.app.convert.recorded import GivenLog
+from joulepath.app.convert.robots import Identified, own_robot_of
 from joulepath.app.engine.listening import Listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
@@ -18,7 +19,6 @@ from joulepath.app.exceptions.stored import PartsNeeded, UnknownFigures, Unknown
 from joulepath.app.store import answers, figures, logs, robots
 from joulepath.app.store.store import Store
 from joulepath.app.tasks.job_document import JOBS, job_document
-from joulepath.app.tasks.kept_answers import answers_given
 from joulepath.models.registry import robot_names
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import UnknownRobot
@@ -34,16 +34,12 @@ class Run(Protocol):
         ...
 
 
-Given = Callable[[], AbstractContextManager[None]]
-"""Function opening a context with access to one item of the database by name."""
-
-
 @dataclass(frozen=True)
 class Equipped:
     """A task with its items of the database."""
 
     task: Task
-    given: tuple[Given, ...]
+    items: Items
 
     @property
     def request_id(self) -> str:
@@ -52,51 +48,31 @@ class Equipped:
 
     def run(self, deadline: float) -> TaskResult:
         """The task's result."""
-        with _within(self.given):
+        with given(self.items):
             return self.task.run(deadline)
 
 
-@dataclass(frozen=True)
-class Needs:
-    """Items of the database used by a task.
+MISSING = (UnknownRobot, UnknownFigures, UnknownLog, PartsNeeded)
+"""Errors of a task without an item of the database."""
 
-    A robot by its name, figures and a log by their ids, kept answers by their ids or paths, jobs by
-    their paths.
-    """
 
-    robot: str | None = None
-    figures: str | None = None
-    log: str | None = None
-    answers: tuple[str, ...] = ()
-
-    def after(self, error: UnknownRobot | UnknownFigures | UnknownLog | PartsNeeded) -> Needs:
-        """Adds the item missing in a worker. Raises the error if the item was provided already."""
-        if isinstance(error, UnknownRobot):
-            more = replace(self, robot=error.name)
-        elif isinstance(error, UnknownFigures):
-            more = replace(self, figures=error.id)
-        elif isinstance(error, UnknownLog):
-            more = replace(self, log=error.id)
-        else:
-            more = replace(self, answers=tuple(dict.fromkeys((*self.answers, *error.names))))
-        if more == self:
-            raise error
-        return more
-
-    async def given(self, store: Store) -> tuple[Given, ...]:
-        """The items, read from the database. Raises UnknownRobot, UnknownFigures, UnknownLog,
-        UnknownAnswer or StoreUnavailable."""
-        found: list[Given] = []
-        if self.log is not None:
-            found.append(partial(log_given, await given_log(store, self.log)))
-        if self.figures is not None:
-            found.append(partial(identified_as, await identified(store, self.figures)))
-        if self.robot is not None and self.robot not in robot_names():
-            found.append(partial(own_robot_named, self.robot, await own_figures(store, self.robot)))
-        if self.answers:
-            kept = {name: await _kept(store, name) for name in self.answers}
-            found.append(partial(answers_given, kept))
-        return tuple(found)
+def missing(
+    error: UnknownRobot | UnknownFigures | UnknownLog | PartsNeeded, items: Items
+) -> list[Key]:
+    """The items missing in a task. Raises the error if the task has them."""
+    keys: list[Key]
+    if isinstance(error, UnknownRobot):
+        keys = [("robot", error.name)]
+    elif isinstance(error, UnknownFigures):
+        keys = [("figures", error.id)]
+    elif isinstance(error, UnknownLog):
+        keys = [("log", error.id)]
+    else:
+        keys = [("answer", name) for name in error.names]
+    new = [key for key in keys if key not in items]
+    if not new:
+        raise error
+    return new
 
 
 @dataclass(frozen=True)
@@ -113,15 +89,16 @@ class ArmEngine:
         engine; StoreUnavailable only for items of the database.
         """
         request = getattr(task, "request", None)
-        needs = Needs(getattr(request, "robot", None), getattr(request, "figures", None))
+        keys = _keys(getattr(request, "robot", None), getattr(request, "figures", None))
+        items: dict[Key, Any] = {}
         while True:
-            given = await needs.given(self.store)
+            items |= await items_of(self.store, keys)
             try:
-                equipped = Equipped(task, given) if given else task
+                equipped = Equipped(task, items) if items else task
                 return await self.run_one(equipped, deadline, tell=tell)
             # only the worker reads the body of an upload, or a kept answer, and the names in it
-            except (UnknownRobot, UnknownFigures, UnknownLog, PartsNeeded) as error:
-                needs = needs.after(error)
+            except MISSING as error:
+                keys = missing(error, items)
 
 
 async def robot_in(store: Store, name: str) -> Robot:
@@ -136,25 +113,24 @@ async def robot_in(store: Store, name: str) -> Robot:
     )
 
 
-async def known_here(store: Store, name: str, used: str | None) -> AbstractContextManager[Any]:
+async def known_here(store: Store, name: str, used: str | None) -> AbstractContextManager[None]:
     """A context in which this process knows an added robot and identified figures.
 
     Raises UnknownRobot, UnknownFigures or StoreUnavailable.
     """
-    return _within(await Needs(name, used).given(store))
+    return given(await items_of(store, _keys(name, used)))
 
 
-def _within(given: tuple[Given, ...]) -> AbstractContextManager[Any]:
-    context = ExitStack()
-    for each in given:
-        context.enter_context(each())
-    return context
+def _keys(robot: str | None, figures: str | None) -> list[Key]:
+    """The added robot and the figures that a request names, if any."""
+    keys: list[Key] = [] if figures is None else [("figures", figures)]
+    return keys if robot is None or robot in robot_names() else [*keys, ("robot", robot)]
 
 
-async def identified(store: Store, id: str) -> Identified:
+async def _identified(store: Store, id: str) -> Identified:
     """The identified figures of this id. Raises UnknownFigures or StoreUnavailable."""
     row = await store.read(partial(figures.get, id=id))
-    return Identified(row.id, row.robot, row.content)
+    return Identified(row.robot, row.content)
 
 
 async def given_log(store: Store, id: str) -> GivenLog:
@@ -174,3 +150,12 @@ async def _kept(store: Store, name: str) -> bytes:
 async def own_figures(store: Store, name: str) -> dict[str, Any]:
     """Figures of an added robot. Raises UnknownRobot or StoreUnavailable."""
     return (await store.read(partial(robots.get, name=name))).figures
+
+
+_READERS = {"robot": own_figures, "figures": _identified, "log": given_log, "answer": _kept}
+
+
+async def items_of(store: Store, keys: Iterable[Key]) -> dict[Key, Any]:
+    """Items from the database. Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer or
+    StoreUnavailable."""
+    return {(kind, name): await _READERS[kind](store, name) for kind, name in keys}

@@ -2,32 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import AbstractContextManager
-from contextvars import ContextVar
 from typing import Any
 
 import orjson
 
 from joulepath.app.convert.given_answer import paths_of_moves
+from joulepath.app.convert.items import item
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import PartsNeeded
-from joulepath.optimizer.context_value import assigned
-
-_KEPT: ContextVar[Mapping[str, bytes] | None] = ContextVar("kept answers", default=None)
-
-
-def answers_given(kept: Mapping[str, bytes]) -> AbstractContextManager[None]:
-    """Within the context, and its thread, requests may name these answers (JSON), by their ids or
-    paths.
-    """
-    return assigned(_KEPT, kept)
 
 
 def kept_answers(names: list[str]) -> list[Any]:
     """The kept answers of these names. Raises PartsNeeded for missing ones, or InvalidRequest."""
-    kept = _KEPT.get() or {}
-    missing = [name for name in names if name not in kept]
+    kept = {name: item(("answer", name)) for name in names}
+    missing = [name for name, body in kept.items() if body is None]
     if missing:
         raise PartsNeeded(missing)
     return [_document(kept[name]) for name in names]

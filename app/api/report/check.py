@@ -22,7 +22,8 @@ from joulepath.app.api.report.placed import of_cycle, rows_at
 from joulepath.app.api.report.programs import program_of, program_of_motion
 from joulepath.app.api.report.request import JOB_DEADLINE
 from joulepath.app.api.report.task import evaluation_of
-from joulepath.app.convert.recorded import GivenLog, log_given
+from joulepath.app.convert.items import given
+from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.optimizer.deadline import NEVER
@@ -196,7 +197,8 @@ def _read_again(bundle: Bundle, request_id: str) -> Iterator[Line]:
         found = evaluation_of(asked, request_id, JOB_DEADLINE)
     else:
         body = base64.b64decode(bundle.log["body"])
-        with log_given(GivenLog(bundle.request["log"], bundle.log["settings"], body)):
+        log = GivenLog(bundle.request["log"], bundle.log["settings"], body)
+        with given({("log", log.id): log}):
             found = evaluation_of(asked, request_id, JOB_DEADLINE)
     for name in ("predicted", "electrical", "by_efforts"):
         stated, own = (

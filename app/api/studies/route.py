@@ -17,7 +17,7 @@ from joulepath.app.api.shared.parameters import (
     WantedFormat,
     set_location,
 )
-from joulepath.app.convert.robots import identified_as, with_figures
+from joulepath.app.convert.robots import with_figures
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
@@ -40,7 +40,7 @@ from joulepath.app.schemas.studies import (
 )
 from joulepath.app.store import studies
 from joulepath.app.studies.answers import as_csv, full, summary
-from joulepath.app.tasks.arm_engine import identified, robot_in
+from joulepath.app.tasks.arm_engine import known_here, robot_in
 from joulepath.optimizer.exceptions import DeadlineExceeded, UnknownRobot
 
 router = APIRouter(prefix="/studies", tags=["studies"], route_class=LargeBodyRoute)
@@ -80,7 +80,7 @@ async def create(
     """
     robot = await robot_in(store, body.robot)
     if body.figures is not None:
-        with identified_as(await identified(store, body.figures)):
+        with await known_here(store, body.robot, body.figures):
             with_figures(robot, body.figures)
     study = studies.new_study(
         body.name, body.robot, body.objective, body.threshold, key, client.owner, body.figures
