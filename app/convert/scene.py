@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
-from typing import TypeVar
-
 import numpy as np
 import numpy.typing as npt
 
-from joulepath.app.convert.fields import decoded
+from joulepath.app.convert.fields import decoded, inside
 from joulepath.app.convert.mesh_file import mesh_from_file
 from joulepath.app.convert.pose import to_base, to_matrix
 from joulepath.app.schemas import scene as asked
@@ -31,15 +27,14 @@ from joulepath.optimizer.problem.scene import (
     capsule_between,
 )
 
-Made = TypeVar("Made")
-
 
 def to_scene(scene: asked.Scene, robot: Robot) -> Scene:
     """The scene of the library. Raises InvalidProblem."""
-    place = partial(_to_obstacle, T_base_frame=to_base(scene.frame, robot))
-    return Scene(
-        [_named(f"scene.obstacles.{k}", partial(place, o)) for k, o in enumerate(scene.obstacles)]
-    )
+    T_base_frame, obstacles = to_base(scene.frame, robot), list[Obstacle]()
+    for k, obstacle in enumerate(scene.obstacles):
+        with inside(f"scene.obstacles.{k}"):
+            obstacles.append(_to_obstacle(obstacle, T_base_frame))
+    return Scene(obstacles)
 
 
 def to_capsules(tool: asked.Tool) -> list[Attachment]:
@@ -50,11 +45,10 @@ def to_capsules(tool: asked.Tool) -> list[Attachment]:
     ]
 
 
+@inside("payload.shape")
 def to_attachment(shape: asked.CarriedShape, touches: list[str] | None) -> Attachment:
     """The shape of a payload, fixed to the flange. Raises InvalidProblem."""
-    return _named(
-        "payload.shape", lambda: Attachment(_to_shape(shape), to_matrix(shape.pose), touches)
-    )
+    return Attachment(_to_shape(shape), to_matrix(shape.pose), touches)
 
 
 def _to_obstacle(given: asked.Obstacle, T_base_frame: Array) -> Obstacle:
@@ -81,14 +75,6 @@ def _to_shape(given: asked.CarriedShape | asked.Obstacle) -> Shape:
     if isinstance(given, shapes.MeshFile):
         return mesh_from_file(given.format, given.data, given.scale)
     return HalfSpace()
-
-
-def _named(field: str, make: Callable[[], Made]) -> Made:
-    """The result of `make`. Its errors get the path of the shape in the request."""
-    try:
-        return make()
-    except InvalidProblem as error:
-        raise InvalidProblem(f"{field}.{error.field}", str(error)) from None
 
 
 def occupied_cells(given: shapes.Voxels) -> npt.NDArray[np.int64]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from joulepath.app.api.cycle.request import CycleRequest, StopRequest, TimeRange
 from joulepath.app.convert.arm import to_arm, to_limits, to_payload
+from joulepath.app.convert.fields import inside, moved
 from joulepath.app.convert.pose import to_base
 from joulepath.app.convert.request import to_branch, to_target, to_target_pose, to_tool_path
 from joulepath.app.convert.tool import with_tool
@@ -64,13 +65,11 @@ def _to_order(request: CycleRequest) -> FreeOrder | None:
 
 
 def _to_stop(k: int, stop: StopRequest, robot: Robot, tool: str | Tool) -> Stop:
-    try:
+    with inside(f"stops.{k}"):
         # Without this field, the payload stays.
         part = to_payload(stop.payload) if "payload" in stop.model_fields_set else None
         payload = None if part is None else with_tool(tool, part)
         limits = None if stop.limits == MoveLimits() else to_limits(stop.limits, robot)
-    except InvalidProblem as error:
-        raise InvalidProblem(f"stops.{k}.{error.field}", str(error)) from None
     return Stop(
         name=str(k + 1) if stop.name is None else stop.name,
         target=_target(stop, robot),
@@ -120,4 +119,4 @@ def _to_line(field: str, line: LineRequest | None, robot: Robot) -> Line | None:
             speed=line.speed,
         )
     except InvalidProblem as error:
-        raise InvalidProblem(f"{field}.{error.field}", str(error)) from None
+        raise moved(error, field) from None
