@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from joulepath.app.cli.answer import OUTPUT, write
-from joulepath.app.cli.store import in_store
+from joulepath.app.cli.store import in_store, robot_named
 from joulepath.app.cli.terminal import table
 
 if TYPE_CHECKING:
@@ -153,18 +153,12 @@ def joint_limits(
 
 def _robot(robot: str) -> Robot:
     """The robot of a name or of a file. Raises DeclaredError or click.FileError."""
-    from joulepath.app.store import robots as stored
     from joulepath.models.own_arm.description import InvalidArm
-    from joulepath.models.own_arm.robots import own_robot
-    from joulepath.models.registry import robot_names
     from joulepath.optimizer.exceptions import InvalidProblem
     from joulepath.optimizer.problem.robots import DESCRIPTIONS, load_robot
 
     try:
-        if robot in robot_names() or robot.endswith(DESCRIPTIONS):
-            return load_robot(robot)
-        row = in_store(lambda store: store.read(partial(stored.get, name=robot)))
-        return own_robot(robot, row.figures)
+        return load_robot(robot) if robot.endswith(DESCRIPTIONS) else robot_named(robot)
     except InvalidArm as error:
         raise InvalidProblem(error.field, str(error)) from None
     except OSError as error:
