@@ -27,7 +27,7 @@ from joulepath.models.own_arm.plausible_units import (
 from joulepath.models.own_arm.rules import NOTES, RULES
 from joulepath.models.own_arm.upright import UprightChain, gravity_in_base
 from joulepath.models.own_arm.urdf_chain import Chain, chain_of
-from joulepath.models.own_arm.urdf_tree import listed, refuse
+from joulepath.models.own_arm.urdf_tree import listed
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 from joulepath.models.urdf import BASE, FLANGE
 
@@ -249,18 +249,20 @@ def _checked_limits(description: Description, chain: Chain) -> dict[str, Any]:
                 else f"no limit `{part}` above 0 in the URDF"
             )
             with problems.noted():
-                refuse(field, f"Joint {joint!r} has {has}: correct it, or give `{field}`.")
+                raise InvalidArm(
+                    field, f"Joint {joint!r} has {has}: correct it, or give `{field}`."
+                )
         with problems.noted():
             values = tuple(of_urdf) if given is None else given
             found[field] = None if missing else per_joint(field, values, chain.joints)
     with problems.noted():
         if not 0 <= description.payload <= PLAUSIBLE.mass:
-            refuse("payload", f"payload must be a mass from 0 to {PLAUSIBLE.mass:g} kg.")
+            raise InvalidArm("payload", f"payload must be a mass from 0 to {PLAUSIBLE.mass:g} kg.")
     widest = np.abs([chain.q_min, chain.q_max]).max(axis=0)
     for joint, angle in zip(chain.joints, widest, strict=True):
         with problems.noted():
             if angle > PLAUSIBLE.angle:
-                refuse(
+                raise InvalidArm(
                     "urdf",
                     f"Joint {joint!r} has a position limit of {angle:.4g} rad: limits must be "
                     f"within {PLAUSIBLE.angle:g} rad. If they are in degrees, divide them by "

@@ -9,9 +9,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from joulepath.models.coupling import Coupling
-from joulepath.models.own_arm.description import PLAUSIBLE, Problems
+from joulepath.models.own_arm.description import PLAUSIBLE, InvalidArm, Problems
 from joulepath.models.own_arm.robot_xml import number
-from joulepath.models.own_arm.urdf_tree import UrdfTree, joint_range, name_of, refuse
+from joulepath.models.own_arm.urdf_tree import UrdfTree, joint_range, name_of
 from joulepath.models.robot import Array
 
 
@@ -94,9 +94,11 @@ def _row(
     while leader in mimics:
         mimic = mimics[leader]
         if leader in passed:
-            refuse("urdf", f"Joint {name!r} mimics itself: one joint of the loop must not mimic.")
+            raise InvalidArm(
+                "urdf", f"Joint {name!r} mimics itself: one joint of the loop must not mimic."
+            )
         if mimic.leader not in names:
-            refuse(
+            raise InvalidArm(
                 "urdf",
                 f"Joint {leader!r} mimics {mimic.leader!r}, which is not a moving joint between "
                 f"base and tip: give the position of {leader!r} in `locked`.",
@@ -105,7 +107,7 @@ def _row(
         multiplier, offset = multiplier * mimic.multiplier, multiplier * mimic.offset + offset
         leader = mimic.leader
     if not PLAUSIBLE.least_multiplier <= abs(multiplier) <= 1 / PLAUSIBLE.least_multiplier:
-        refuse(
+        raise InvalidArm(
             "urdf",
             f"Joint {name!r} mimics {leader!r} with a multiplier of {multiplier:g}: its size must "
             f"be from {PLAUSIBLE.least_multiplier:g} to {1 / PLAUSIBLE.least_multiplier:g}. Make "
@@ -142,7 +144,7 @@ def coupled_ranges(moving: Sequence[Element], coupling: Coupling) -> Array:
             row[2] = min(row[2], speed / abs(k))
         if not row[0] < row[1]:
             names = name_of(moving[place]), name_of(moving[leader])
-            refuse(
+            raise InvalidArm(
                 "urdf",
                 f"Joint {names[0]!r} mimics {names[1]!r}, and within its own range the other one "
                 f"cannot move: correct the <limit> or the <mimic> of {names[0]!r}.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from xml.etree.ElementTree import Element
 
-from joulepath.models.own_arm.description import PLAUSIBLE
+from joulepath.models.own_arm.description import PLAUSIBLE, InvalidArm
 from joulepath.models.own_arm.robot_xml import ZERO, numbers
 from joulepath.models.own_arm.urdf_tree import (
     FIXED,
@@ -17,20 +17,19 @@ from joulepath.models.own_arm.urdf_tree import (
     joint_range,
     listed,
     name_of,
-    refuse,
 )
 
 
 def check_held(tree: UrdfTree, name: str) -> None:
     """Raises InvalidArm unless a joint exists and a single position can hold it."""
     if name not in tree.joints:
-        refuse(
+        raise InvalidArm(
             "locked",
             f"There is no joint {name!r} in the URDF: its joints are {listed(tree.joints)}.",
         )
     kind = tree.joints[name].get("type")
     if kind in ("floating", "planar"):
-        refuse(
+        raise InvalidArm(
             "locked",
             f"Joint {name!r} is {kind}, so no single position can hold it: make it fixed instead.",
         )
@@ -63,7 +62,9 @@ def check_turning(joint: Element, moving: Sequence[Element], holds_others: bool)
             remedy += ', in place of "others", with the positions of all other held joints'
     if not any(each.get("type") in TURNING for each in moving[: moving.index(joint)]):
         remedy += f", or name {joint_end(joint, 'child')!r} as `base`"
-    refuse("urdf", f"Joint {name_of(joint)!r} is {kind}: only revolute joints can move: {remedy}.")
+    raise InvalidArm(
+        "urdf", f"Joint {name_of(joint)!r} is {kind}: only revolute joints can move: {remedy}."
+    )
 
 
 def check_range(joint: Element) -> None:
@@ -75,7 +76,7 @@ def check_range(joint: Element) -> None:
     if kind == "revolute" and (
         limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib
     ):
-        refuse(
+        raise InvalidArm(
             "urdf",
             f"Joint {name!r} has no <limit> with `lower` and `upper`: add them, or make it "
             "continuous.",
@@ -84,14 +85,14 @@ def check_range(joint: Element) -> None:
     if kind == "revolute" and not ends[0] < ends[1]:
         # Exporters write two zeros for a range without an entry.
         how = "exchange them" if ends[0] > ends[1] else "write its range, or make it continuous"
-        refuse(
+        raise InvalidArm(
             "urdf",
             f"Joint {name!r} cannot move, its lower limit being no less than the upper: {how}, or "
             "make it fixed.",
         )
     lower, upper, *_ = joint_range(joint)
     if not lower < upper:
-        refuse(
+        raise InvalidArm(
             "urdf",
             f"Joint {name!r} cannot move: its soft limits are exchanged, or beyond its <limit>.",
         )
@@ -107,13 +108,13 @@ def check_rest(tree: UrdfTree, moving: Sequence[Element], locked: Mapping[str, f
         and tree.carrier(joint_end(joint, "parent"), names)
     ]
     if len(loose) == 1:
-        refuse(
+        raise InvalidArm(
             "locked",
             f"Joint {loose[0]!r} moves a link that is not between base and tip: give its "
             'position in `locked`, or "others" to hold it at zero.',
         )
     if loose:
-        refuse(
+        raise InvalidArm(
             "locked",
             f"Joints move links that are not between base and tip: {listed(loose)}. Give their "
             'positions in `locked`, or "others" to hold them all at zero.',

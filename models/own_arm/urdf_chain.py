@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.coupling import Coupling
-from joulepath.models.own_arm.description import Description, Problems
+from joulepath.models.own_arm.description import Description, InvalidArm, Problems
 from joulepath.models.own_arm.estimated_masses import Estimate, add_inertials
 from joulepath.models.own_arm.followers import (
     coupled_ranges,
@@ -41,7 +41,6 @@ from joulepath.models.own_arm.urdf_tree import (
     listed,
     name_of,
     parsed_urdf,
-    refuse,
     restore_rounded,
 )
 from joulepath.models.possible_inertia import nearest_possible_inertia
@@ -106,7 +105,7 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
     for field, link in (("base", base), ("tip", description.tip)):
         with problems.noted():
             if link not in tree.links:
-                refuse(
+                raise InvalidArm(
                     field,
                     f"There is no link {link!r} in the URDF: its links are {listed(tree.links)}.",
                 )
@@ -121,7 +120,7 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
         joint for joint in path if joint.get("type") != FIXED and joint.get("name") not in held
     ]
     if not 1 <= len(moving) <= CHAIN.joints:
-        refuse(
+        raise InvalidArm(
             "tip",
             f"Between base and tip {len(moving)} joints move: from 1 to {CHAIN.joints} are "
             "possible.",
@@ -209,7 +208,7 @@ def _merged(
         if model.nq != len(moving):
             raise ValueError(f"of {len(moving)} joints it finds {model.nq}")
     except (RuntimeError, ValueError, IndexError) as error:
-        refuse("urdf", f"Pinocchio does not read the URDF: {error}.")
+        raise InvalidArm("urdf", f"Pinocchio does not read the URDF: {error}.") from None
     joints = tuple(list(names)[k] for k in coupling.own) or tuple(names)
     q_min, q_max, v_max, tau_max = ranges.T
     return Chain(

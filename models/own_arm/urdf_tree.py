@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import NoReturn
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -78,7 +77,7 @@ class UrdfTree:
         """The tree of a <robot>. Raises InvalidArm for repeated names, loops or several roots."""
         links, joints = (_named(robot, kind) for kind in ("link", "joint"))
         if not links:
-            refuse(
+            raise InvalidArm(
                 "urdf",
                 "The URDF has no <link>. A file with only macros describes no arm: name the "
                 "file that uses them.",
@@ -90,7 +89,7 @@ class UrdfTree:
         problems.raise_any()
         roots = [each for each in links if each not in above]
         if len(roots) != 1:
-            refuse(
+            raise InvalidArm(
                 "urdf",
                 f"A URDF has one root link, not {len(roots)}: {listed(roots)}. Connect them by "
                 "fixed joints, or remove those that are no part of the arm.",
@@ -103,7 +102,7 @@ class UrdfTree:
             front = [child for link in front for child in below.get(link, ())]
             reached.update(front)
         if loose := [link for link in links if link not in reached]:
-            refuse("urdf", f"Links form a loop: {listed(loose)}. A URDF is a tree.")
+            raise InvalidArm("urdf", f"Links form a loop: {listed(loose)}. A URDF is a tree.")
         return UrdfTree(tuple(links), joints, above, roots[0])
 
     def path(self, base: str, tip: str) -> list[Element]:
@@ -111,7 +110,7 @@ class UrdfTree:
         found, link = list[Element](), tip
         while link != base:
             if link not in self.above:
-                refuse(
+                raise InvalidArm(
                     "tip",
                     f"The tip {tip!r} is not connected to the base {base!r}: name a base that "
                     "carries it.",
@@ -146,7 +145,7 @@ def _named(robot: Element, kind: str) -> dict[str, Element]:
             found[name] = each
     if repeated:
         with problems.noted():
-            refuse(
+            raise InvalidArm(
                 "urdf",
                 f"Two {kind}s of the URDF have one name: {listed(dict.fromkeys(repeated))}. Give "
                 "each a name of its own.",
@@ -162,10 +161,12 @@ def _hang(
     parent, child = (joint_end(joint, side) for side in ("parent", "child"))
     for link in (parent, child):
         if link not in links:
-            refuse("urdf", f"Joint {name!r} is at a link {link!r} that the URDF does not have.")
+            raise InvalidArm(
+                "urdf", f"Joint {name!r} is at a link {link!r} that the URDF does not have."
+            )
     if child in above:
         other = name_of(above[child])
-        refuse(
+        raise InvalidArm(
             "urdf",
             f"Link {child!r} is the child of two joints, {other!r} and {name!r}: a URDF is a "
             "tree. Remove one of them.",
@@ -182,11 +183,11 @@ def parsed_urdf(text: str, checkpoint: Checkpoint) -> Element:
     # A simulator's element may have an expression that its plug-in resolves.
     used = [each for part in root if part.tag in READ for each in part.iter()]
     if any(_is_macro(each) for each in root) or any(map(_has_macro, used)):
-        refuse(
+        raise InvalidArm(
             "urdf", "This is xacro: make a URDF of it first, by `xacro arm.urdf.xacro > arm.urdf`."
         )
     if sum(1 for _ in root) > CHAIN.elements:
-        refuse("urdf", f"The URDF has more than {CHAIN.elements} links and joints.")
+        raise InvalidArm("urdf", f"The URDF has more than {CHAIN.elements} links and joints.")
     return root
 
 
@@ -291,7 +292,7 @@ def joint_axis(joint: Element) -> Array:
     )
     largest = np.abs(axis).max()
     if not largest > 0:
-        refuse("urdf", f"Joint {name_of(joint)!r} has an <axis> of no length.")
+        raise InvalidArm("urdf", f"Joint {name_of(joint)!r} has an <axis> of no length.")
     # the squares of large and small numbers are infinite and zero
     axis /= largest
     return np.asarray(axis / np.linalg.norm(axis))
@@ -307,7 +308,7 @@ def joint_end(joint: Element, side: str) -> str:
     end = joint.find(side)
     link = None if end is None else end.get("link")
     if not link or len(link) > PLAUSIBLE.name:
-        refuse(
+        raise InvalidArm(
             "urdf",
             f"Joint {name_of(joint)!r} has no <{side}> link of up to {PLAUSIBLE.name} characters.",
         )
@@ -319,7 +320,7 @@ def name_of(element: Element) -> str:
     name = element.get("name")
     if not name or len(name) > 100 or not name.isprintable():
         instead = f", but {name[:100]!r}" if name else ""
-        refuse(
+        raise InvalidArm(
             "urdf",
             f"A {element.tag} of the URDF has no name of up to 100 printable characters{instead}.",
         )
@@ -332,8 +333,3 @@ def listed(names: Iterable[str]) -> str:
     return ", ".join(found[: CHAIN.listed_names]) + (
         f" and {len(found) - CHAIN.listed_names} others" if len(found) > CHAIN.listed_names else ""
     )
-
-
-def refuse(field: str, message: str) -> NoReturn:
-    """Raises InvalidArm at a field of the description."""
-    raise InvalidArm(field, message)
