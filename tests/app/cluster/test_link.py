@@ -149,7 +149,7 @@ async def test_work_of_a_machine_that_stops_is_done_elsewhere(
         await until((tmp_path / "runs" / "started").exists)
         (tmp_path / "runs" / "released").touch()
         assert await running != process
-        assert not alive(process)
+        await until(lambda: not alive(process))
         await until(lambda: cluster.slots == 2 * LINK.per_process)
 
 
