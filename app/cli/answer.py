@@ -143,6 +143,17 @@ def write(answer: bytes, output: Path | None) -> None:
         raise click.FileError(str(output), error.strerror or "") from None
 
 
+def json_object(content: bytes, otherwise: str) -> dict[str, Any]:
+    """The JSON object in a file. Raises click.UsageError with the message `otherwise`."""
+    try:
+        found = orjson.loads(content)
+    except orjson.JSONDecodeError:
+        found = None
+    if not isinstance(found, dict):
+        raise click.UsageError(otherwise)
+    return found
+
+
 def parsed(answer: bytes) -> dict[str, Any]:
     """The fields of a JSON answer."""
     content: dict[str, Any] = orjson.loads(answer)

@@ -10,7 +10,16 @@ import click
 import orjson
 
 from joulepath.app.cli import terminal
-from joulepath.app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, parsed, write
+from joulepath.app.cli.answer import (
+    FILE,
+    OUTPUT,
+    answered,
+    content_of,
+    json_object,
+    new_id,
+    parsed,
+    write,
+)
 from joulepath.app.cli.terminal import table
 
 Kind = Literal["json", "csv"]
@@ -88,7 +97,7 @@ def evaluate(
     if kind == "json" and (query or settings is not None):
         named = "--settings" if settings is not None else f"--{next(iter(query)).replace('_', '-')}"
         raise click.UsageError(f"{named} is for a CSV: put the field into the JSON of FILE.")
-    fields = (settings_in(settings) if settings is not None else {}) | query
+    fields = query if settings is None else settings_in(settings) | query
     with tempfile.NamedTemporaryFile(prefix="joulepath-", suffix=f".{kind}") as copy:
         copy.write(content_of(file))
         copy.flush()
@@ -114,13 +123,7 @@ def _answer(file: str, kind: Kind, fields: dict[str, Any], wanted: Kind, deadlin
 
 def settings_in(file: Path) -> dict[str, Any]:
     """The fields of a settings file. Raises click.UsageError."""
-    try:
-        fields = parsed(file.read_bytes())
-    except orjson.JSONDecodeError:
-        fields = None
-    if not isinstance(fields, dict):
-        raise click.UsageError("--settings must name a file that holds one JSON object.")
-    return fields
+    return json_object(file.read_bytes(), "--settings must name a file that holds one JSON object.")
 
 
 def moves_of(answer: dict[str, Any]) -> str:

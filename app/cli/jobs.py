@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 import orjson
 
-from joulepath.app.cli.answer import FILE, OUTPUT, write
+from joulepath.app.cli.answer import FILE, OUTPUT, content_of, json_object, write
 from joulepath.app.cli.exit_codes import PROBLEM
-from joulepath.app.cli.service import SERVICE, connect, json_of
+from joulepath.app.cli.service import SERVICE, connect
 from joulepath.app.cli.terminal import steps, table
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ HEAD = ("id", "name", "state", "progress", "done", "failed", "waiting", "created
 PERIOD = 1.0
 """Time between two looks at a job that is waited for [s]."""
 
+_NO_JOB = "FILE must hold the JSON of POST /jobs: an object with `requests`."
 _ID = click.argument("id")
 
 
@@ -58,9 +59,9 @@ def send(client: Client, file: str, wait: bool) -> int:
 
     With `--wait`, the exit code is 1 if a request failed.
     """
-    body = json_of(file)
+    body = json_object(content_of(file), _NO_JOB)
     if "requests" not in body:
-        raise click.UsageError("FILE must hold the JSON of POST /jobs: an object with `requests`.")
+        raise click.UsageError(_NO_JOB)
     job = client.send_job(**body)
     write(job["id"].encode(), None)
     return _waited(client, job["id"]) if wait else 0

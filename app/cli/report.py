@@ -129,7 +129,7 @@ def report(
         compile_kernel_of(request.robot)
     task: Task = ReportTask(request, new_id())
     if is_log:
-        fields = settings_in(settings) if settings is not None else {}
+        fields = {} if settings is None else settings_in(settings)
         fields |= {} if robot is None else {"robot": robot}
         log = read_log_file(fields, Path(file))
         task = Equipped(task, {("log", log.id): log})

@@ -1,4 +1,4 @@
-"""Common parts of commands for a running service: its address, and request bodies."""
+"""Common parts of commands for a running service: its address and its client."""
 
 from __future__ import annotations
 
@@ -6,9 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 import click
-import orjson
-
-from joulepath.app.cli.answer import content_of
 
 _URL = click.option(
     "--url",
@@ -34,12 +31,3 @@ def connect(context: click.Context, url: str, key: str | None) -> None:
         context.obj = context.with_resource(Client(url, key))
     except ModuleNotFoundError as error:
         raise click.UsageError(str(error)) from None
-
-
-def json_of(file: str) -> dict[str, Any]:
-    """The object in a file, or in standard input for `-`; empty if there is none."""
-    try:
-        body = orjson.loads(content_of(file))
-    except orjson.JSONDecodeError:
-        return {}
-    return body if isinstance(body, dict) else {}

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 import orjson
 
-from joulepath.app.cli.answer import FILE, OUTPUT, write
-from joulepath.app.cli.service import SERVICE, connect, json_of
+from joulepath.app.cli.answer import FILE, OUTPUT, content_of, json_object, write
+from joulepath.app.cli.service import SERVICE, connect
 from joulepath.app.cli.terminal import table
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def add(client: Client, id: str, file: str, output: Path | None) -> None:
     FILE has the JSON of `POST /optimize`, or a step: an object with `optimize` or `evaluate`.
     Robot, figures and objective are taken from the study.
     """
-    body = json_of(file)
+    body = json_object(content_of(file), "FILE must hold one JSON object.")
     step = body if len(body) == 1 and next(iter(body)) in STEPS else {"optimize": body}
     write(orjson.dumps(client.add_iteration(id, step)), output)
 
