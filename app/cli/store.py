@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from joulepath.app.engine.task import Task
     from joulepath.app.store.store import Store
     from joulepath.models.robot import Robot
-
-T = TypeVar("T")
 
 
 def run_with_store(task: Task, deadline: float, answers: Path | None = None) -> TaskResult:
