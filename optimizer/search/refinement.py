@@ -32,10 +32,6 @@ class RefinementSettings:
     surplus is worth nearly the highest value there. Shares above 0.75 saved 1.3 % and 0.7 % in 2 of
     60 random requests.
     """
-    duration_ratios: tuple[float, ...] = (0.93, 0.95, 0.97, 0.985, 1.0, 1.015, 1.03)
-    """Fixed durations, in multiples of the one found, for which a motion that stores energy is
-    solved anew. Solves with a free duration miss the optimum where the storage just takes all
-    surplus, by 0.1 to 0.4 % in 2 of 56 random requests."""
     least_charged: float = 1e-6
     """Energy that a motion stores, as a share of the energy it needs, above which other values of a
     joule of surplus are tried."""
@@ -105,24 +101,12 @@ def _stores_energy(state: SearchState, candidate: Candidate) -> bool:
 
 
 def _value_surplus_otherwise(state: SearchState, candidate: Candidate) -> None:
-    """Improve a candidate by solves with other values of the surplus.
-
-    With a free duration, the candidate is also solved anew at durations around the duration of the
-    best solution, with the highest value of the surplus.
-    """
-    problem, deadline = state.problem, state.deadline
-    supply, most = problem.arm.regeneration, problem.arm.bus.efficiency
+    """Improve a candidate by solves with other values of the surplus."""
+    supply, most = state.problem.arm.regeneration, state.problem.arm.bus.efficiency
     for share in REFINEMENT.surplus_shares:
-        if not deadline.passed:
+        if not state.deadline.passed:
             value = supply + share * max(most - supply, 0.0)
             solve_from(state, candidate, sampled(candidate.spline), fine=False, surplus_value=value)
-    if problem.has_fixed_duration:
-        return
-    found, longest = candidate.spline.duration, problem.duration_max or np.inf
-    for ratio in REFINEMENT.duration_ratios:
-        duration = ratio * found
-        if (problem.duration_min or 0.0) <= duration <= longest and not deadline.passed:
-            improve(state, candidate, lambda solver: solver.solve(), duration=duration)
 
 
 def start_from_fastest(state: SearchState, candidate: Candidate) -> None:
