@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 from typing import Protocol
@@ -12,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.angles import nearest_turn
 from joulepath.optimizer.problem.branches import BranchLabel
 
 
@@ -85,6 +87,22 @@ class SelfMotion(Protocol):
             Centres (n, nq) and half sides (n, nq) [rad] of the boxes.
         """
         ...
+
+
+def nearest_on_arcs(
+    parameter: float, arcs: Sequence[tuple[float, float]], periodic: bool = True
+) -> float:
+    """Parameter [rad] on one of the arcs that is nearest to a given one.
+
+    If the curve is `periodic`, a full turn of the parameter leads to the same member.
+    """
+    found = list[tuple[float, float]]()
+    for lower, upper in arcs:
+        middle = np.asarray((lower + upper) / 2)
+        near = float(nearest_turn(np.asarray(parameter), middle)) if periodic else parameter
+        on_arc = min(max(near, lower), upper)
+        found.append((abs(near - on_arc), on_arc))
+    return min(found)[1]
 
 
 def is_point(motion: SelfMotion) -> bool:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
+from joulepath.optimizer.kinematics.self_motion import nearest_on_arcs
 from joulepath.optimizer.kinematics.seven.redundant_boxes import Cells, boxes_of
 from joulepath.optimizer.kinematics.seven.redundant_pose import RedundantPose
 from joulepath.optimizer.problem.branches import Label
@@ -125,14 +126,7 @@ class RedundantCurve:
 
     def clipped(self, parameter: float) -> float:
         """Nearest parameter on an arc."""
-        found = []
-        for lower, upper in self.arcs:
-            near = parameter
-            if self.whole:
-                near = float(nearest_turn(np.asarray(parameter), np.asarray((lower + upper) / 2)))
-            on_arc = float(np.clip(near, lower, upper))
-            found.append((abs(near - on_arc), on_arc))
-        return min(found)[1]
+        return nearest_on_arcs(parameter, self.arcs, self.whole)
 
     def at(self, parameter: Array) -> Array:
         """Configurations (n, 7) [rad] at parameters (n,) on the arcs."""

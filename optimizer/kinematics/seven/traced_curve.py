@@ -16,6 +16,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
 from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.self_motion import nearest_on_arcs
 from joulepath.optimizer.kinematics.seven.across_curve import project_across
 from joulepath.optimizer.kinematics.seven.curve_tracing import TracedPath
 from joulepath.optimizer.kinematics.seven.traced_curve_stack import Rows, TracedCurveStack
@@ -99,17 +100,7 @@ class TracedCurve:
 
     def clipped(self, parameter: float) -> float:
         """Nearest parameter on an arc."""
-        found = []
-        for lower, upper in self.arcs:
-            middle = (lower + upper) / 2
-            near = (
-                parameter + 2 * np.pi * round((middle - parameter) / (2 * np.pi))
-                if self.closed
-                else parameter
-            )
-            on_arc = min(max(near, lower), upper)
-            found.append((abs(near - on_arc), on_arc))
-        return float(min(found)[1])
+        return nearest_on_arcs(parameter, self.arcs, self.closed)
 
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
         """Boxes around the curve, see `SelfMotion.boxes`, from the largest joint rates between

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.six.stretched_wrist import StretchedWrist
-from joulepath.optimizer.problem.branches import Label
 
 LEAST_ENTRY = 1e-14
 """Largest difference of a pose from the identity by rounding [m, 1]."""
@@ -62,43 +60,3 @@ def angles_without_rounding(q: Array) -> Array:
     """Angles q (n,) [rad] in [-pi, pi]; angles within rounding of zero become exactly zero."""
     q = wrapped(q)
     return np.where(np.abs(q) < LEAST_ENTRY, 0.0, q)
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnMotion:
-    """Self-motion of a closed form, in the joint positions of a file."""
-
-    motion: StretchedWrist
-    drawing: Drawing
-
-    @property
-    def label(self) -> Label:
-        """Branch of the curve."""
-        return self.motion.label
-
-    @property
-    def free(self) -> tuple[int, ...]:
-        """Indices of the moving joints."""
-        return self.motion.free
-
-    @property
-    def arcs(self) -> list[tuple[float, float]]:
-        """Intervals of the parameter [rad]."""
-        return self.motion.arcs
-
-    def parameter(self, q: Array) -> float:
-        """Parameter [rad] of the member nearest to q (6,) [rad]."""
-        return self.motion.parameter(self.drawing.form(q))
-
-    def clipped(self, parameter: float) -> float:
-        """Nearest parameter [rad] on an arc."""
-        return self.motion.clipped(parameter)
-
-    def at(self, parameter: Array) -> Array:
-        """Configurations (n, 6) [rad] at parameters (n,) on the arcs."""
-        return self.drawing.file_within_turn(self.motion.at(parameter))
-
-    def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
-        """Boxes around the curve, see `SelfMotion.boxes`."""
-        centre, sides = self.motion.boxes(parameter, half)
-        return self.drawing.file(centre), sides

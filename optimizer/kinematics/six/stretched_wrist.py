@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
 from joulepath.optimizer.kinematics.reach import REACH
+from joulepath.optimizer.kinematics.self_motion import nearest_on_arcs
+from joulepath.optimizer.kinematics.six.drawing import Drawing
 from joulepath.optimizer.problem.branches import Label
 
 
@@ -24,7 +25,8 @@ class StretchedWrist:
     The parameter is the angle h = q2 + q3 + q4 of the fifth axis in the arm's plane. The fourth
     axis lies at (x, z) = (ahead - d5 sin h, above + d5 cos h) [m] in this plane, relative to the
     second. With its distance D from the second axis, the law of cosines gives q3 on the elbow's
-    `side` (1 or -1) and q2. The last joint is q6 = turn (h - h0).
+    `side` (1 or -1) and q2. The last joint is q6 = turn (h - h0). These are joint positions of the
+    closed form; the `drawing` converts them to those of the file.
     """
 
     label: Label
@@ -38,6 +40,7 @@ class StretchedWrist:
     h0: float
     turn: float
     side: float
+    drawing: Drawing
 
     free = (1, 2, 3, 5)
 
@@ -67,16 +70,11 @@ class StretchedWrist:
 
     def parameter(self, q: Array) -> float:
         """Parameter h [rad] of q (6,), clipped to the nearest end if it is on no arc."""
-        return self.clipped(float(q[1] + q[2] + q[3]))
+        return self.clipped(float(self.drawing.form(q)[1:4].sum()))
 
     def clipped(self, parameter: float) -> float:
         """Nearest parameter [rad] on an arc."""
-        found = []
-        for lower, upper in self.arcs:
-            near = float(nearest_turn(np.asarray(parameter), np.asarray((lower + upper) / 2)))
-            on_arc = float(np.clip(near, lower, upper))
-            found.append((abs(near - on_arc), on_arc))
-        return min(found)[1]
+        return nearest_on_arcs(parameter, self.arcs)
 
     def at(self, parameter: Array) -> Array:
         """Configurations (n, 6) [rad] at parameters (n,) on the arcs."""
@@ -88,7 +86,7 @@ class StretchedWrist:
         q[:, 1] = np.arctan2(z, x) - self._turned(shoulder, self.a2 < 0)
         q[:, 2] = self._turned(elbow, self._opposed)
         q[:, 3], q[:, 5] = h - q[:, 1] - q[:, 2], self.turn * (h - self.h0)
-        return np.clip(wrapped(q), -np.pi, np.pi)
+        return self.drawing.file_within_turn(q)
 
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
         """Boxes that cover the curve, see `SelfMotion.boxes`.
@@ -121,7 +119,7 @@ class StretchedWrist:
         centre[:, 3] = h - centre[:, 1] - centre[:, 2]
         sides[:, 3] = half + sides[:, 1] + sides[:, 2]
         centre[:, 5], sides[:, 5] = self.turn * (h - self.h0), half
-        return centre, sides
+        return self.drawing.file(centre), sides
 
     @property
     def _opposed(self) -> bool:

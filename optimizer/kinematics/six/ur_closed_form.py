@@ -16,7 +16,6 @@ from scipy.optimize import minimize_scalar
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.kinematics.self_motion import is_point
-from joulepath.optimizer.kinematics.six.drawing import DrawnMotion
 from joulepath.optimizer.kinematics.six.stretched_wrist import StretchedWrist
 from joulepath.optimizer.kinematics.six.ur_geometry import UR, URGeometry, heading_uncertainty
 from joulepath.optimizer.problem.branches import Label
@@ -135,13 +134,13 @@ class URClosedForm(URGeometry):
             found.append((q2, q3, s3))
         return found
 
-    def self_motions(self, T: Array, limits: Limits | None = None) -> list[DrawnMotion]:
+    def self_motions(self, T: Array, limits: Limits | None = None) -> list[StretchedWrist]:
         """Self-motions of the flange pose T (4, 4), one for each shoulder with a stretched wrist,
         and elbow.
 
         Self-motions without a reachable member are left out; none is cut to the limits.
         """
-        T, found = self.drawing.pose(T), list[DrawnMotion]()
+        T, found = self.drawing.pose(T), list[StretchedWrist]()
         R = T[:3, :3]
         for q1, ahead in self.shoulders(T):
             c1, s1 = cos(q1), sin(q1)
@@ -166,9 +165,10 @@ class URClosedForm(URGeometry):
                     h0 + self.tilt,
                     1.0 if sin(h1 - h0) > 0 else -1.0,
                     side,
+                    self.drawing,
                 )
                 if motion.arcs:
-                    found.append(DrawnMotion(motion, self.drawing))
+                    found.append(motion)
                     if is_point(motion):
                         break  # stretched or folded: the elbow has one side
         return found

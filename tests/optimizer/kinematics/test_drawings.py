@@ -16,7 +16,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.joint_axes import JointAxes
 from joulepath.optimizer.kinematics.six.decomposition import DecomposedArm
-from joulepath.optimizer.kinematics.six.drawing import DrawnMotion
+from joulepath.optimizer.kinematics.six.stretched_wrist import StretchedWrist
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from tests.optimizer.kinematics.axis_patterns import UR_AXES, redrawn, robot_of, shifted
 from tests.optimizer.kinematics.six_joints import (
@@ -75,7 +75,7 @@ def test_singular_configurations_are_found_in_every_drawing(axes: JointAxes) -> 
         stretched = np.where(np.arange(6) == 4, rng.choice([0.0, np.pi]), q)
         found = solved(robot, form.drawing.file(stretched))
         assert found.away < FOUND and found.error < ACCURACY
-        assert any(isinstance(each.self_motion, DrawnMotion) for each in found.branches)
+        assert any(isinstance(each.self_motion, StretchedWrist) for each in found.branches)
         straight = np.where(np.arange(6) == 2, 0.0, q)
         assert solved(robot, form.drawing.file(straight)).away < FOUND_ON_AN_EDGE
         assert "elbow" in form.singular_parts(form.drawing.file(straight))
