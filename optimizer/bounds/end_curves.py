@@ -9,7 +9,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.bounds.subdivide import Rows
+from joulepath.models.rows import Rows
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.kinematics.covers.branch_covers import BranchCover, boxes_on
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration

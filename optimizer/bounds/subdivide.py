@@ -8,12 +8,13 @@ the whole set at any time, and it never decreases.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
-from typing import Generic, Self, TypeVar
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.models.rows import Rows
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -68,30 +69,6 @@ class SearchLimits:
 
 
 DEFAULT_LIMITS = SearchLimits()
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Base of dataclasses of arrays (n, …), or of tables, with rows in common."""
-
-    def __getitem__(self, chosen: Indices | slice) -> Self:
-        return type(self)(*(getattr(self, field.name)[chosen] for field in fields(self)))
-
-    def joined(self, other: Self) -> Self:
-        """The rows of this table, followed by the rows of the other."""
-        return type(self)(
-            *(
-                _joined(getattr(self, field.name), getattr(other, field.name))
-                for field in fields(self)
-            )
-        )
-
-
-def _joined(first: Array | Rows, second: Array | Rows) -> Array | Rows:
-    if isinstance(first, Rows):
-        assert isinstance(second, Rows)
-        return first.joined(second)
-    return np.concatenate([first, second])
 
 
 @dataclass(frozen=True)

@@ -245,16 +245,16 @@ class _Proof:
             self.sample_normals(instants, end, pair, part),
         )
         others = np.flatnonzero(~of_cloud | (travel > self.settings.part_travel))
-        return checks[others].with_more(parts)
+        return checks[others].joined(parts)
 
     def halved(self, instants: Instants, checks: IntervalChecks) -> tuple[Instants, IntervalChecks]:
         """Both halves of every interval, with the normals at the middle."""
         intervals, interval = checks.distinct_intervals()
         middle = interval + len(instants.t)
-        instants = instants.with_more(self.motion.instants(instants.t[intervals].mean(axis=1)))
+        instants = instants.joined(self.motion.instants(instants.t[intervals].mean(axis=1)))
         witness = self.sample_normals(instants, middle, checks.pair, checks.part)
         first = replace(checks, end=middle, at_end=witness)
-        return instants, first.with_more(replace(checks, begin=middle, at_begin=witness))
+        return instants, first.joined(replace(checks, begin=middle, at_begin=witness))
 
     def sample_normals(
         self, instants: Instants, instant: Indices, pair: Indices, part: Indices

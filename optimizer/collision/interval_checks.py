@@ -7,26 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.models.rows import Rows
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.collision.pair_distance import WitnessPoints
 
 
 @dataclass(frozen=True)
-class Instants:
+class Instants(Rows):
     """Times t (k,) [s] of a motion, and the link frames at these times (k, nq + 1, 4, 4)."""
 
     t: Array
     frames: Array
 
-    def with_more(self, more: Instants) -> Instants:
-        """These instants, then others."""
-        return Instants(
-            np.concatenate([self.t, more.t]), np.concatenate([self.frames, more.frames])
-        )
-
 
 @dataclass(frozen=True)
-class IntervalChecks:
+class IntervalChecks(Rows):
     """Pairs over intervals (k,), with their distances at both ends.
 
     `pair` are indices of pairs, `begin` and `end` indices of instants. `part` is the part of the
@@ -39,27 +34,6 @@ class IntervalChecks:
     end: Indices
     at_begin: WitnessPoints
     at_end: WitnessPoints
-
-    def __getitem__(self, chosen: Indices) -> IntervalChecks:
-        return IntervalChecks(
-            self.pair[chosen],
-            self.part[chosen],
-            self.begin[chosen],
-            self.end[chosen],
-            self.at_begin[chosen],
-            self.at_end[chosen],
-        )
-
-    def with_more(self, more: IntervalChecks) -> IntervalChecks:
-        """These checks, then others."""
-        return IntervalChecks(
-            np.concatenate([self.pair, more.pair]),
-            np.concatenate([self.part, more.part]),
-            np.concatenate([self.begin, more.begin]),
-            np.concatenate([self.end, more.end]),
-            self.at_begin.with_more(more.at_begin),
-            self.at_end.with_more(more.at_end),
-        )
 
     def distinct_intervals(self) -> tuple[Indices, Indices]:
         """The distinct intervals (m, 2), as indices of instants, and the interval of every check

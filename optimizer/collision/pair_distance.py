@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.models.rows import Rows
 from joulepath.optimizer.collision.bodies import Body, Indices
 from joulepath.optimizer.collision.cloud_pairs import CloudPairs
 from joulepath.optimizer.collision.coal_distance import ConvexPairs
@@ -22,7 +23,7 @@ from joulepath.optimizer.collision.pair_arrays import PairArrays, PairKind
 
 
 @dataclass(frozen=True)
-class WitnessPoints:
+class WitnessPoints(Rows):
     """Nearest points of k pairs: signed distance (k,) [m], unit normal (k, 3) from first to second
     body, and a point.
 
@@ -33,18 +34,6 @@ class WitnessPoints:
     distance: Array
     normal: Array
     point: Array
-
-    def __getitem__(self, chosen: Indices) -> WitnessPoints:
-        return WitnessPoints(self.distance[chosen], self.normal[chosen], self.point[chosen])
-
-    def with_more(self, more: WitnessPoints) -> WitnessPoints:
-        """These witness points, then others."""
-        return WitnessPoints(
-            *(
-                np.concatenate([getattr(self, name), getattr(more, name)])
-                for name in ("distance", "normal", "point")
-            )
-        )
 
 
 class PairGeometry:

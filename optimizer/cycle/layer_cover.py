@@ -11,11 +11,12 @@ its full turns counts.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
+from joulepath.models.rows import Rows
 from joulepath.optimizer.bounds.least_displacement import LIMIT_TOLERANCE
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.cycle.layers import Layer
@@ -45,7 +46,7 @@ COVER = LayerCoverSettings()
 
 
 @dataclass(frozen=True)
-class CoverCells:
+class CoverCells(Rows):
     """Cells of the angle of the tool, with the boxes of their configurations.
 
     Attributes:
@@ -68,18 +69,6 @@ class CoverCells:
     levels: Array
     placed: Mask
     turned: Mask
-
-    def __getitem__(self, chosen: Indices) -> CoverCells:
-        return CoverCells(*(getattr(self, each.name)[chosen] for each in fields(self)))
-
-    def joined(self, other: CoverCells) -> CoverCells:
-        """These cells followed by others."""
-        return CoverCells(
-            *(
-                np.concatenate([getattr(b, each.name) for b in (self, other)])
-                for each in fields(self)
-            )
-        )
 
 
 class LayerCover:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from joulepath.models.robot import Array
+from joulepath.models.rows import Rows
 from joulepath.optimizer.kinematics.path_constraints import ConstraintRatios, PathConstraints
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates
 
@@ -35,7 +36,7 @@ class PathConstraintValues:
 
 
 @dataclass(frozen=True)
-class NearPathConstraints:
+class NearPathConstraints(Rows):
     """Path constraints near their bounds."""
 
     points: Index
@@ -49,11 +50,6 @@ class NearPathConstraints:
 
     slack: Array
     """Distances to the bounds, shape (rows,)."""
-
-    def __getitem__(self, chosen: Index) -> NearPathConstraints:
-        return NearPathConstraints(
-            self.points[chosen], self.columns[chosen], self.ratio[chosen], self.slack[chosen]
-        )
 
 
 _NONE_NEAR = NearPathConstraints(
