@@ -191,7 +191,6 @@ def solve_from(
     samples: tuple[Array, Array],
     fine: bool,
     surplus_value: float | None = None,
-    duration: float | None = None,
 ) -> None:
     """Optimise a candidate from samples of a motion, and accept a motion of less energy.
 
@@ -201,10 +200,9 @@ def solve_from(
         samples: q, shape (k, nq) [rad], and t, shape (k,) [s].
         fine: whether to use more control points.
         surplus_value: assumed value of a joule of net surplus on a bus with energy storage [1].
-        duration: fixed duration [s]; None for the allowed intervals.
     """
     q, t = samples
-    improve(state, candidate, lambda solver: solver.solve_from(q, t, fine), surplus_value, duration)
+    improve(state, candidate, lambda solver: solver.solve_from(q, t, fine), surplus_value)
 
 
 def improve(
@@ -212,7 +210,6 @@ def improve(
     candidate: Candidate,
     attempt: Callable[[Method], SolveResult],
     surplus_value: float | None = None,
-    duration: float | None = None,
 ) -> None:
     """Optimise a candidate by an attempt in each duration interval, and accept a motion of less
     energy.
@@ -222,11 +219,8 @@ def improve(
         candidate: the candidate.
         attempt: the attempt.
         surplus_value: as in `solve_from`.
-        duration: as in `solve_from`.
     """
     for interval in duration_intervals(state.prepared, candidate.q_goal, surplus_value):
-        if duration is not None:
-            interval = replace(interval, t_min=duration, t_max=duration)
         context = partial(context_of, state, candidate, interval)
         result, moved = attempted(state, candidate, context, attempt)
         if result.spline is not None:

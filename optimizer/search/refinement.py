@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 
 from joulepath.optimizer.dynamics.plant import has_corners
-from joulepath.optimizer.motion.spline import retimed, sampled
+from joulepath.optimizer.motion.spline import sampled
 from joulepath.optimizer.search.attempts import improve, solve_from
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.sharpening import sharpen
 from joulepath.optimizer.search.sharper_cost import sharpen_cost
 from joulepath.optimizer.search.sliding import slides
-from joulepath.optimizer.search.state import DURATION_TOLERANCE, SearchState
+from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.free_spline import FREE_SPLINE
 from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.solve_result import SolveResult
@@ -75,22 +75,8 @@ def refine(state: SearchState, candidate: Candidate) -> None:
         solve_from(state, candidate, sampled(candidate.spline), fine=True)
     start_from_fastest(state, candidate)
     sharpen_cost(state, candidate)
-    if method.guess_baselines:
-        _start_otherwise(state, candidate)
-
-
-def _start_otherwise(state: SearchState, candidate: Candidate) -> None:
-    """Improve a candidate by solves with other values of the surplus or other durations."""
-    problem, deadline = state.problem, state.deadline
-    if _stores_energy(state, candidate):
+    if method.guess_baselines and _stores_energy(state, candidate):
         _value_surplus_otherwise(state, candidate)
-    longest, spline = problem.duration_max or 0.0, candidate.spline
-    is_faster = spline.duration < longest * (1 - DURATION_TOLERANCE)
-    if problem.objective == "mechanical" and is_faster and not deadline.passed:
-        # the smoothed |tau v| is positive at rest, the work is not: a free duration is too short.
-        # `lasting` rounds differently and would lead the objective to other local optima
-        slower = retimed(spline, longest / spline.duration)
-        solve_from(state, candidate, sampled(slower), fine=False, duration=longest)
 
 
 def _stores_energy(state: SearchState, candidate: Candidate) -> bool:
