@@ -15,7 +15,6 @@ are cheap; the best of them are followed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -74,12 +73,6 @@ class SharpeningSettings:
     """Largest ratio of a first motion's energy to the least if it is solved in the middle space."""
     most_coarse: int = 6
     """Largest number of first motions solved in the middle space."""
-    rival_ratio: float = 1.03
-    """Largest ratio of a candidate's energy to the least if it is followed beside the best."""
-    most_rivals: int = 2
-    """Largest number of candidates followed beside the best."""
-    behind_ratio: float = 1.005
-    """Ratio to the best motion's energy at the same width above which a rival is given up."""
     rounder_ratio: float = 1.015
     """Ratio of a motion's energy before its corners are as sharp as possible to its last energy."""
     fast_ratio: float = 1.03
@@ -114,10 +107,10 @@ SHARPENING = SharpeningSettings()
 
 
 def sharpen(state: SearchState, best: Candidate) -> None:
-    """Follow the best candidate, and candidates of little more energy, to motions of sharp corners.
+    """Follow the best candidate to a motion of sharp corners.
 
-    Without corners in the objective, or without evenly spaced control points in the method, it does
-    nothing.
+    Candidates of little more energy are solved in the middle space before. Without corners in the
+    objective, or without evenly spaced control points in the method, it does nothing.
     """
     problem = state.problem
     if not state.method.evenly_spaced or not has_corners(problem.objective, problem.arm):
@@ -130,20 +123,17 @@ def sharpen(state: SearchState, best: Candidate) -> None:
     ):
         # its corners are sharp already
         return
-    contenders = _near(state, best, SHARPENING.coarse_ratio)[: SHARPENING.most_coarse]
+    contenders = _contenders(state, best)
     coarse = {each: each.spline for each in contenders}
     for contender in contenders:
         _Follower(state, contender).solve_in_middle_space()
     best = state.best() or best
-    rivals = _near(state, best, SHARPENING.rival_ratio)[1 : SHARPENING.most_rivals + 1]
     follower, mechanical = _Follower(state, best), problem.objective == "mechanical"
     if not mechanical:
         follower.solve_around(coarse.get(best, best.spline))
     # with ends that slide, motions from random starts are known already
     restarts = SHARPENING.restarts if mechanical and not state.sliding_work_sought else 0
-    ahead = follower.follow(restarts)
-    for rival in rivals:
-        _Follower(state, rival).follow(restarts=0, ahead=ahead)
+    follower.follow(restarts)
     best = state.best() or best
     if (
         not mechanical
@@ -161,26 +151,19 @@ def follow_in_time(state: SearchState, candidate: Candidate, best: float) -> Non
         candidate: solved candidate.
         best: least known energy [J]; inf if none is known.
     """
-    follower, ahead = _Follower(state, candidate), list[float]()
+    follower = _Follower(state, candidate)
     if len(candidate.spline.control_points) != SHARPENING.middle_points:
         follower.solve_in_middle_space()
-    if np.isfinite(best):
-        # with rounder corners it needs more
-        ahead = [SHARPENING.rounder_ratio * best] * (len(SHARPENING.steps) - 1)
-    follower.follow(restarts=0, ahead=ahead)
+    # with rounder corners it needs more
+    follower.follow(restarts=0, most=SHARPENING.rounder_ratio * best)
 
 
-def _near(state: SearchState, best: Candidate, ratio: float) -> list[Candidate]:
-    """Candidates with a motion of at most a ratio of the best energy, the best first."""
+def _contenders(state: SearchState, best: Candidate) -> list[Candidate]:
+    """The candidates of least energy, up to `coarse_ratio` times the best energy."""
+    most = SHARPENING.coarse_ratio * (best.energy or 0.0)
     solved = [each for each in state.candidates if each.energy is not None]
-    most = ratio * (best.energy or 0.0)
-    return sorted(
-        (each for each in solved if each is best or (each.energy or 0.0) <= most), key=_energy_of
-    )
-
-
-def _energy_of(candidate: Candidate) -> float:
-    return np.inf if candidate.energy is None else candidate.energy
+    near = (each for each in solved if each is best or (each.energy or 0.0) <= most)
+    return sorted(near, key=lambda each: each.energy or 0.0)[: SHARPENING.most_coarse]
 
 
 @dataclass(frozen=True)
@@ -190,18 +173,14 @@ class _Follower:
     state: SearchState
     candidate: Candidate
 
-    def follow(self, restarts: int, ahead: Sequence[float] = ()) -> list[float]:
+    def follow(self, restarts: int, most: float = np.inf) -> None:
         """Solve with corners of one width after the other.
 
         It starts from the candidate's motion or the best of motions from random starts.
 
         Args:
             restarts: number of random starts.
-            ahead: energies of another candidate at the widths [J]; if one is far below, the
-                candidate is given up.
-
-        Returns:
-            Energies at the widths [J], inf without a motion.
+            most: energy at a width above which the candidate is given up [J].
         """
         cost_of = self.state.prepared.cost_of
         coarse = sorted(self._restarted(restarts), key=cost_of)[: SHARPENING.followed]
@@ -211,18 +190,15 @@ class _Follower:
             )
             for motion in coarse
         ]
-        best: Spline | None = min(
+        motion = min(
             [self.candidate.spline, *(each for each in middle if each is not None)], key=cost_of
         )
-        energies: list[float] = []
         is_mechanical = self.state.problem.objective == "mechanical"
-        for k, step in enumerate(SHARPENING.steps if is_mechanical else SHARPENING.isolated_steps):
-            if best is not None:
-                best = self.solved(best, step.width, SHARPENING.dense_points, step.progress)
-            energies.append(cost_of(best))
-            if k < len(ahead) and energies[k] > SHARPENING.behind_ratio * ahead[k]:
-                break
-        return energies
+        for step in SHARPENING.steps if is_mechanical else SHARPENING.isolated_steps:
+            found = self.solved(motion, step.width, SHARPENING.dense_points, step.progress)
+            if found is None or cost_of(found) > most:
+                return
+            motion = found
 
     def solve_in_middle_space(self) -> None:
         """Solve from the candidate's motion in the middle space, with wide corners."""
