@@ -25,13 +25,13 @@ from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.cycle.cycle_search import CYCLE_SEARCH
 from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleSolution
 from joulepath.optimizer.cycle.errors import NoSequence
+from joulepath.optimizer.cycle.free_turns import free_turns
 from joulepath.optimizer.cycle.known_motions import KnownMotion, knowing, known_motions
 from joulepath.optimizer.cycle.move_problem import MOVE, problem_of
 from joulepath.optimizer.cycle.neighbouring_configurations import has_free_postures, with_neighbours
 from joulepath.optimizer.cycle.tool_turns import (
     Turns,
     evenly_from,
-    turns_all_around,
     turns_near,
     turns_of_solution,
     with_turns,
@@ -170,7 +170,7 @@ def _first_cycle(
 
     Its bound holds for all orientations. Without time for it, the cycle without full turns.
     """
-    all_around = {name: turns_all_around(cycle.arm, stop) for name, stop in free.items()}
+    all_around = {name: free_turns(cycle, stop) for name, stop in free.items()}
     # many orientations need nearly the same energy: a proof that none is better would take long
     settings, excess = FREE_ORIENTATIONS, 0.0
     if any(stop.path is None for stop in free.values()):

@@ -119,9 +119,7 @@ def _stop_with_turns(stop: Stop, tried: Sequence[Turns], bounded: bool) -> Stop:
     if stop.path is None:
         pose = stop.target
         assert isinstance(pose, ConeOrientedPose)
-        (reference,) = sample_orientations(pose, 1)
-        poses = tuple(_turned(pose, reference, turn) for turn, _ in tried)
-        return replace(stop, target=SampledPoses(poses, pose if bounded else None))
+        return replace(stop, target=turned_poses(pose, tried, bounded))
     ends = [_ends(stop, *turns) for turns in tried]
     free_start, free_goal = (
         ConeOrientedPose.about(end, _axis_of(stop)) if bounded else None for end in ends[0]
@@ -130,6 +128,15 @@ def _stop_with_turns(stop: Stop, tried: Sequence[Turns], bounded: bool) -> Stop:
     path = replace(stop.path, goal=ends[0][1], goals=goals)
     starts = SampledPoses(tuple(start for start, _ in ends), free_start)
     return replace(stop, target=starts, path=path)
+
+
+def turned_poses(
+    pose: ConeOrientedPose, turns: Sequence[Turns], bounded: bool = False
+) -> SampledPoses:
+    """A pose of partly free orientation at given turns; see `with_turns`."""
+    (reference,) = sample_orientations(pose, 1)
+    poses = tuple(_turned(pose, reference, turn) for turn, _ in turns)
+    return SampledPoses(poses, pose if bounded else None)
 
 
 def _axis_of(stop: Stop) -> Array:

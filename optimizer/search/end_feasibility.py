@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from joulepath.models.robot import Array
+from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import ClosestPair
 from joulepath.optimizer.exceptions import InvalidProblem
@@ -58,6 +58,11 @@ def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidRea
         if beyond > 0:
             result[k] = InvalidReason(f"the tool points {beyond:.4f} rad outside its cone", beyond)
     return result
+
+
+def are_feasible(prepared: PreparedProblem, q: Array) -> Mask:
+    """Which configurations q (n, nq) [rad] are feasible, as a mask (n,)."""
+    return np.array([ruling is None for ruling in check_configurations(prepared, q)], dtype=bool)
 
 
 def raise_if_none_is_left(

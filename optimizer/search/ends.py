@@ -32,17 +32,45 @@ SIDES: tuple[Side, ...] = ("start", "goal")
 
 
 @dataclass(frozen=True)
+class SampleCounts:
+    """Numbers of samples of poses of partly free orientation."""
+
+    orientations: int
+    """Number of orientations within the cones of all poses together."""
+    turns: int
+    """Number of orientations about the axes of all poses together that are free about an axis
+    alone."""
+    members: int
+    """Number of members of the self-motion of each orientation."""
+
+    def shared(self, poses: int) -> SampleCounts:
+        """The numbers of each of several poses, not below the least ones."""
+        orientations, turns = (
+            max(count // max(poses, 1), SAMPLING.least_orientations)
+            for count in (self.orientations, self.turns)
+        )
+        members = self.members if poses <= 2 else 2 * self.members // poses
+        return SampleCounts(orientations, turns, max(members, SAMPLING.least_members))
+
+
+@dataclass(frozen=True)
 class SamplingSettings:
     """Settings of the samples of targets that infinitely many configurations reach."""
 
-    orientations: int = 96
-    """Number of orientations sampled of all poses of partly free orientation together."""
+    counts: SampleCounts = SampleCounts(orientations=96, turns=24, members=4)
+    """Numbers of samples of the ends of a motion, and of the stops of a cycle."""
+    redundant: SampleCounts = SampleCounts(orientations=48, turns=24, members=16)
+    """The same for a motion of a redundant arm. With 4 members of a self-motion, obstacles hide
+    whole branches: a quarter of the goals with a free rotation needed more energy than with a given
+    rotation, up to twice as much."""
+    path_start: SampleCounts = SampleCounts(orientations=48, turns=12, members=4)
+    """Numbers of samples of the start of a tool path."""
     least_orientations: int = 12
     """Least number of orientations sampled of one pose."""
+    least_members: int = 4
+    """Least number of members of the self-motion of each sampled orientation."""
     members: int = 24
     """Number of members sampled of the self-motion of a pose."""
-    members_per_orientation: int = 4
-    """Number of members sampled of the self-motion of each sampled orientation."""
     orientations_per_check: int = 24
     """Number of orientations between two checks of the deadline: about ten milliseconds."""
     cone_share: float = 0.999
@@ -64,11 +92,13 @@ def ends(
 
     See `ends_of`.
     """
-    return ends_of(prepared, name, getattr(prepared.problem, name))
+    is_redundant = prepared.arm.robot.nq > POSE_FREEDOMS
+    counts = SAMPLING.redundant if is_redundant else SAMPLING.counts
+    return ends_of(prepared, name, getattr(prepared.problem, name), counts)
 
 
 def ends_of(
-    prepared: PreparedProblem, name: str, target: Target, samples: int = SAMPLING.orientations
+    prepared: PreparedProblem, name: str, target: Target, counts: SampleCounts = SAMPLING.counts
 ) -> tuple[list[EndConfiguration], list[UnreachableTarget]]:
     """The end configurations of a target that a problem allows, and its members without any.
 
@@ -76,7 +106,7 @@ def ends_of(
         prepared: the problem.
         name: name of the target in errors.
         target: target.
-        samples: number of orientations sampled of all poses of partly free orientation together.
+        counts: numbers of samples of poses of partly free orientation.
 
     Raises:
         UnreachableTargets: none of several targets has a configuration.
@@ -86,7 +116,7 @@ def ends_of(
         InvalidProblem: a pose of an arm without inverse kinematics.
     """
     if not isinstance(target, AnyOf):
-        return _ends_of(prepared, name, target, 0, samples), []
+        return _ends_of(prepared, name, target, 0, counts), []
     tolerance = sum(isinstance(member, ConeOrientedPose) for member in target.targets)
     reached: list[EndConfiguration] = []
     unreachable: list[UnreachableTarget] = []
@@ -98,7 +128,7 @@ def ends_of(
                 name,
                 member,
                 index,
-                max(samples // max(tolerance, 1), SAMPLING.least_orientations),
+                counts.shared(tolerance),
             )
         except (UnreachablePose, NoConfigurationFound, SingularPose, OutsideLimits) as error:
             unreachable.append(UnreachableTarget(name, index, str(error)))
@@ -118,7 +148,7 @@ def _ends_of(
     name: str,
     target: Single,
     index: int,
-    samples: int = SAMPLING.orientations,
+    counts: SampleCounts,
     on_curve: int = SAMPLING.members,
 ) -> list[EndConfiguration]:
     """The end configurations of one target.
@@ -128,7 +158,7 @@ def _ends_of(
         name: name of the target in errors.
         target: target.
         index: index of the target.
-        samples: number of orientations sampled if the orientation is partly free.
+        counts: numbers of samples if the orientation is partly free.
         on_curve: number of members sampled of a self-motion.
     """
     problem = prepared.problem
@@ -139,7 +169,7 @@ def _ends_of(
         return [EndConfiguration(label_of(robot, q), q, turns, True, index)]
     kinematics = required_inverse_kinematics(robot, name)
     if isinstance(target, ConeOrientedPose):
-        return _ends_of_samples(prepared, name, target, index, samples)
+        return _ends_of_samples(prepared, name, target, index, counts)
     solutions = kinematics.solve(
         target.T, problem.arm.T_flange_tcp, limits, windings=False, target=name, members=on_curve
     )
@@ -161,15 +191,15 @@ def _ends_of(
 
 
 def _ends_of_samples(
-    prepared: PreparedProblem, name: str, pose: ConeOrientedPose, index: int, samples: int
+    prepared: PreparedProblem, name: str, pose: ConeOrientedPose, index: int, counts: SampleCounts
 ) -> list[EndConfiguration]:
     """The end configurations of orientations sampled evenly within the cones of pose and tool."""
     pose = within_cone(prepared.arm, pose, SAMPLING.cone_share)
     if prepared.arm.robot.nq < POSE_FREEDOMS:
-        return _ends_of_few_joints(prepared, name, pose, index, samples)
+        return _ends_of_few_joints(prepared, name, pose, index, counts.orientations)
     found: list[EndConfiguration] = []
     errors: list[UnreachablePose | NoConfigurationFound | SingularPose] = []
-    tried = samples if pose.freedom > 1 else max(samples // 4, SAMPLING.least_orientations)
+    tried = counts.orientations if pose.freedom > 1 else counts.turns
     for k, R in enumerate(sample_orientations(pose, tried)):
         if k % SAMPLING.orientations_per_check == SAMPLING.orientations_per_check - 1:
             checkpoint()
@@ -181,7 +211,8 @@ def _ends_of_samples(
                     name,
                     pose.with_orientation(R),
                     index,
-                    on_curve=SAMPLING.members_per_orientation,
+                    counts,
+                    on_curve=counts.members,
                 )
             ]
         except (UnreachablePose, NoConfigurationFound, SingularPose) as error:

@@ -1,18 +1,22 @@
-"""Dense samples of self-motions, for ends with collisions at all coarse samples."""
+"""Dense samples of self-motions and of orientations, for ends whose coarse samples all collide."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives, nearest_turns
 from joulepath.optimizer.kinematics.self_motion import spread
 from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.targets import Target, members
 from joulepath.optimizer.search.candidates import Candidate, bound, pairs
-from joulepath.optimizer.search.end_feasibility import check_configurations
-from joulepath.optimizer.search.ends import SAMPLING
+from joulepath.optimizer.search.end_feasibility import are_feasible
+from joulepath.optimizer.search.ends import SAMPLING, SampleCounts, ends_of
 from joulepath.optimizer.search.errors import InCollision
 
 
@@ -23,13 +27,18 @@ class FreeMemberSettings:
     members: int = 720
     """Number of members of a self-motion that are checked, about half a degree apart. Of these,
     about as many are kept as of coarse samples."""
+    most_of_orientations: int = 384
+    """Largest number of kept configurations of partly free orientation."""
 
 
 FREE_MEMBERS = FreeMemberSettings()
+DENSE = SampleCounts(orientations=384, turns=192, members=16)
+"""Numbers of samples of poses of partly free orientation that are checked: the orientations about
+an axis are two degrees apart."""
 
 
 def bounded(prepared: PreparedProblem, candidates: list[Candidate]) -> list[Candidate]:
-    """Compute the lower bounds of candidates, with denser samples of self-motions if necessary.
+    """Compute the lower bounds of candidates, with denser samples of an end if necessary.
 
     Denser samples replace the samples of an end if all of them collide.
 
@@ -56,27 +65,66 @@ def bounded(prepared: PreparedProblem, candidates: list[Candidate]) -> list[Cand
                 side: list(dict.fromkeys(getattr(each, side) for each in candidates))
                 for side in ("start", "goal")
             }
-            sides[error.target] = free_members(prepared, sides[error.target])
+            sides[error.target] = denser_ends(
+                prepared,
+                error.target,
+                getattr(prepared.problem, error.target),
+                sides[error.target],
+                lambda q: are_feasible(prepared, q),
+            )
             if not sides[error.target]:
                 raise
         candidates = pairs(prepared, sides["start"], sides["goal"])
 
 
-def free_members(prepared: PreparedProblem, ends: list[EndConfiguration]) -> list[EndConfiguration]:
-    """Feasible members of the self-motions of ends, in the order of the self-motions."""
+def denser_ends(
+    prepared: PreparedProblem,
+    name: str,
+    target: Target,
+    ends: Sequence[EndConfiguration],
+    are_free: Callable[[Array], Mask],
+) -> list[EndConfiguration]:
+    """Free configurations of a target from dense samples; empty if the target has no samples.
+
+    Args:
+        prepared: the problem.
+        name: name of the target in errors.
+        target: target.
+        ends: its end configurations from coarse samples.
+        are_free: which configurations (n, nq) [rad] are free, as a mask (n,).
+    """
+    return [
+        *_free_members(prepared, ends, are_free),
+        *_free_orientations(prepared, name, target, are_free),
+    ]
+
+
+def _free_members(
+    prepared: PreparedProblem,
+    ends: Sequence[EndConfiguration],
+    are_free: Callable[[Array], Mask],
+) -> list[EndConfiguration]:
+    """Free members of the self-motions of ends, in the order of the self-motions."""
     limits = prepared.arm.active_limits
     found = list[EndConfiguration]()
     of_motion = {end.self_motion: end for end in ends if end.self_motion is not None}
     for motion, end in of_motion.items():
-        members = motion.at(spread(motion, FREE_MEMBERS.members))
-        q, held = nearest_turns(members, limits)
+        q, held = nearest_turns(motion.at(spread(motion, FREE_MEMBERS.members)), limits)
         q = q[np.array(held)]
-        free = [
-            each
-            for each, ruling in zip(q, check_configurations(prepared, q), strict=True)
-            if ruling is None
-        ]
+        free = q[are_free(q)]
         for each in free[:: max(len(free) // SAMPLING.members, 1)]:
             choices = full_turn_alternatives(each, limits.q_min, limits.q_max)
             found.append(replace(end, q=each, choices=choices))
     return found
+
+
+def _free_orientations(
+    prepared: PreparedProblem, name: str, target: Target, are_free: Callable[[Array], Mask]
+) -> list[EndConfiguration]:
+    """Free configurations of the poses of partly free orientation of a target."""
+    if not any(isinstance(each, ConeOrientedPose) for each in members(target)):
+        return []
+    ends = [end for end in ends_of(prepared, name, target, DENSE)[0] if end.tolerance is not None]
+    free = np.flatnonzero(are_free(np.array([end.q for end in ends])))
+    step = max(len(free) // FREE_MEMBERS.most_of_orientations, 1)
+    return [ends[k] for k in free[::step].tolist()]

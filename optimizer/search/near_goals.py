@@ -4,7 +4,9 @@ Samples of the orientation lie far apart on the manifold of goal configurations,
 joints the arm has. So every sample moves over the manifold to the nearest shortest path from the
 start, in displacements weighted by friction. There are few such places. Of these places, the
 samples, and the samples with a joint turned the other way, configurations of locally least expected
-energy are solved.
+energy are solved. If the place of a sample collides with the scene, a configuration between both
+takes its place, in a second choice: such configurations are close to obstacles and may be hard to
+reach, so they do not displace others.
 """
 
 from __future__ import annotations
@@ -14,14 +16,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from joulepath.models.robot import Array
+from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.kinematics.end_configuration import FULL_TURN
 from joulepath.optimizer.kinematics.goal_manifold import GoalManifold
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, bound
-from joulepath.optimizer.search.end_feasibility import check_configurations
+from joulepath.optimizer.search.end_feasibility import are_feasible
 from joulepath.optimizer.search.sampled_ends import activate_deferred, moved_end, on_branch
 from joulepath.optimizer.search.seeds import SEEDS, estimates, estimates_between, expected
 from joulepath.optimizer.solve.methods.method import above
@@ -55,6 +57,10 @@ class NearGoalSettings:
         separation=0.7, energy_ratio=SEEDS.work_ratio, count=3
     )
     """Choice for mechanical work, for which straight lines and bounds predict little."""
+    beside_obstacles: ChoiceSettings = ChoiceSettings(separation=0.3, energy_ratio=1.3, count=4)
+    """Choice of the configurations between samples and places that collide."""
+    approach: tuple[float, ...] = (0.8, 0.6, 0.4, 0.2)
+    """Shares of the way from a sample to a place that collides, tried in turn."""
     others: int = 4
     """Number of samples of other branches solved too, in order of their lower bounds.
 
@@ -91,7 +97,8 @@ def activate_near_goals(prepared: PreparedProblem, candidates: list[Candidate]) 
         ([each.shortest for each in samples], [each.lower_bound for each in samples])
     )
     samples = [samples[k] for k in by_bound[: NEAR_GOALS.most_moved].tolist()]
-    pool = [*_moved(prepared, samples), *samples]
+    moved, beside_obstacles = _moved(prepared, samples)
+    pool = [*moved, *samples]
     is_work = prepared.problem.objective == "mechanical"
     if is_work:
         chosen = _separate_minima(pool, estimates(prepared, pool), NEAR_GOALS.mechanical)
@@ -101,6 +108,9 @@ def activate_near_goals(prepared: PreparedProblem, candidates: list[Candidate]) 
         if turned:
             pool, energy = [*pool, *turned], np.concatenate([energy, expected(prepared, turned)])
         chosen = _separate_minima(pool, energy, NEAR_GOALS.electrical)
+    if beside_obstacles:
+        energy = (estimates if is_work else expected)(prepared, beside_obstacles)
+        chosen += _separate_minima(beside_obstacles, energy, NEAR_GOALS.beside_obstacles)
     for each in chosen:
         if each.deferred:
             each.activate()
@@ -113,22 +123,76 @@ def activate_near_goals(prepared: PreparedProblem, candidates: list[Candidate]) 
     return True
 
 
-def _moved(prepared: PreparedProblem, samples: Sequence[Candidate]) -> list[Candidate]:
-    """Feasible candidates at the distinct places to which samples moved, shortest paths first."""
+def _moved(
+    prepared: PreparedProblem, samples: Sequence[Candidate]
+) -> tuple[list[Candidate], list[Candidate]]:
+    """Feasible candidates at the distinct places to which samples moved, shortest paths first.
+
+    Returns:
+        The candidates at these places, and those on the way to places that collide with the scene.
+    """
     law, limits = prepared.arm.friction_law, prepared.arm.active_limits
     weights = law.coulomb + law.viscous * limits.v_max / 2 + NEAR_GOALS.drag * limits.tau_max
     goals, starts = (
         np.array([getattr(each, name) for each in samples]) for name in ("q_goal", "q_start")
     )
-    cost = np.full(len(samples), np.inf)
+    between, is_between = goals.copy(), np.zeros(len(samples), dtype=bool)
+    reached = is_between.copy()
     for target, pose in {each.goal.target: each.goal.tolerance for each in samples}.items():
         assert pose is not None
         rows = np.array([k for k, each in enumerate(samples) if each.goal.target == target])
-        goals[rows], reached = GoalManifold.of(prepared.arm, pose).nearest(
-            goals[rows], starts[rows], weights
-        )
-        cost[rows] = np.where(reached, np.abs(goals[rows] - starts[rows]) @ weights, np.inf)
-    ends, kept = np.hstack([starts, goals]), list[int]()
+        manifold = GoalManifold.of(prepared.arm, pose)
+        nearest, reached[rows] = manifold.nearest(goals[rows], starts[rows], weights)
+        if prepared.arm.scene.names:
+            between[rows], is_between[rows] = _short_of_collisions(
+                prepared, manifold, goals[rows], nearest
+            )
+        goals[rows] = nearest
+
+    def at(places: Array, is_place: Mask) -> list[Candidate]:
+        cost = np.where(is_place, np.abs(places - starts) @ weights, np.inf)
+        return _at_places(prepared, samples, places, cost)
+
+    return at(goals, reached), at(between, reached & is_between)
+
+
+def _short_of_collisions(
+    prepared: PreparedProblem, manifold: GoalManifold, q: Array, places: Array
+) -> tuple[Array, Mask]:
+    """The farthest feasible configurations tried on the ways to places that are infeasible.
+
+    Args:
+        prepared: problem of the motions.
+        manifold: manifold of the goal.
+        q: feasible configurations on the manifold, shape (n, nq) [rad].
+        places: their places on the manifold, shape (n, nq) [rad].
+
+    Returns:
+        The configurations (n, nq) [rad], and a mask (n,) of the rows with one.
+    """
+    found, is_found = q.copy(), np.zeros(len(q), dtype=bool)
+    is_open = ~are_feasible(prepared, places)
+    for share in NEAR_GOALS.approach:
+        rows = np.flatnonzero(is_open & ~is_found)
+        if len(rows):
+            found[rows], reached = manifold.put(q[rows] + share * (places[rows] - q[rows]))
+            is_found[rows] = reached & are_feasible(prepared, found[rows])
+    return found, is_found
+
+
+def _at_places(
+    prepared: PreparedProblem, samples: Sequence[Candidate], places: Array, cost: Array
+) -> list[Candidate]:
+    """Feasible candidates at the distinct places of samples.
+
+    Args:
+        prepared: problem of the motions.
+        samples: the samples.
+        places: their places, shape (n, nq) [rad].
+        cost: lengths of the paths to these, shape (n,), shortest first; infinite without a place.
+    """
+    ends = np.hstack([np.array([each.q_start for each in samples]), places])
+    kept = list[int]()
     for k in np.argsort(cost, kind="stable")[: int(np.isfinite(cost).sum())].tolist():
         distances = np.abs(ends[kept] - ends[k]).max(axis=1)
         if not kept or distances.min() > NEAR_GOALS.place_distance:
@@ -136,17 +200,14 @@ def _moved(prepared: PreparedProblem, samples: Sequence[Candidate]) -> list[Cand
         if len(kept) == NEAR_GOALS.most_places:
             break
     if kept:
-        ruled = check_configurations(prepared, goals[kept])
-        kept = [
-            k
-            for k, ruling in zip(kept, ruled, strict=True)
-            if ruling is None and on_branch(prepared, goals[k])
-        ]
-    at_place = [moved_end(prepared, samples[k].goal, goals[k]) for k in kept]
-    moved = [
-        Candidate(samples[k].start, end, starts[k], end.q)
-        for k, end in zip(kept, at_place, strict=True)
+        feasible = are_feasible(prepared, places[kept])
+        kept = [k for k, is_feasible in zip(kept, feasible, strict=True) if is_feasible]
+    at_place = [
+        (samples[k].start, moved_end(prepared, samples[k].goal, places[k]), samples[k].q_start)
+        for k in kept
+        if on_branch(prepared, places[k])
     ]
+    moved = [Candidate(start, end, q_start, end.q) for start, end, q_start in at_place]
     if moved:
         bound(prepared, moved, [])
     return moved

@@ -26,7 +26,7 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Target
 from joulepath.optimizer.search.candidates import Candidate, bound, pairs
-from joulepath.optimizer.search.ends import ends, ends_of, label_of
+from joulepath.optimizer.search.ends import SAMPLING, ends, ends_of, label_of
 from joulepath.optimizer.search.errors import PathAttempt, PathInfeasible
 
 
@@ -36,8 +36,6 @@ class PathEndSettings:
 
     equal_distance: float = 1e-6
     """Displacement [rad] below which the end of a path is at given joint positions."""
-    orientations: int = 48
-    """Number of orientations sampled of a free start; a quarter of it about a single axis."""
 
 
 PATH_ENDS = PathEndSettings()
@@ -51,7 +49,7 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
     """
     course, limits = prepared.course, prepared.arm.active_limits
     assert course is not None
-    starts, _ = ends_of(prepared, "start", prepared.problem.start, PATH_ENDS.orientations)
+    starts, _ = ends_of(prepared, "start", prepared.problem.start, SAMPLING.path_start)
     found, attempts = list[Candidate](), list[PathAttempt]()
     for start, trace in zip(starts, _traces(prepared, starts), strict=True):
         choices = _choices(start, trace, prepared.problem.goal)

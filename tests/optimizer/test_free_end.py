@@ -38,7 +38,7 @@ from joulepath.optimizer.kinematics.tool_path.turning_grid import (
 )
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.candidates import bound, pairs
-from joulepath.optimizer.search.ends import ends_of
+from joulepath.optimizer.search.ends import SampleCounts, ends_of
 from joulepath.optimizer.search.path_ends import bound_beside, path_candidates
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solve.methods.end_angle import try_angles
@@ -258,9 +258,9 @@ def test_the_bound_between_free_ends_is_that_of_the_best_pair_but_for_little(see
     start, goal = ends_turned(seed)
     asked = PreparedProblem.of(along(free(goal), start=HOME, tool_path=None))
     proven = bound_between_free_ends(asked, free(start), free(goal), NEVER, np.inf)
-    known = pairs(
-        asked, ends_of(asked, "goal", free(start), 72)[0], ends_of(asked, "goal", free(goal), 72)[0]
-    )
+    counts = SampleCounts(orientations=72, turns=18, members=4)
+    starts, goals = (ends_of(asked, "goal", free(end), counts)[0] for end in (start, goal))
+    known = pairs(asked, starts, goals)
     bound(asked, known)
     least = min(each.lower_bound for each in known)
     assert 0.9 * least < proven <= least
