@@ -16,8 +16,9 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.targets import Target, members
 from joulepath.optimizer.search.candidates import Candidate, bound, pairs
 from joulepath.optimizer.search.end_feasibility import are_feasible
-from joulepath.optimizer.search.ends import SAMPLING, SampleCounts, ends_of
+from joulepath.optimizer.search.ends import SAMPLING, SIDES, SampleCounts, ends_of
 from joulepath.optimizer.search.errors import InCollision
+from joulepath.optimizer.search.path_ends import path_candidates
 
 
 @dataclass(frozen=True)
@@ -58,22 +59,27 @@ def bounded(prepared: PreparedProblem, candidates: list[Candidate]) -> list[Cand
             bound(prepared, candidates)
             return candidates
         except InCollision as error:
-            if error.target in denser:
+            # the start of a tool path determines its goal
+            name = "start" if prepared.problem.tool_path is not None else error.target
+            if name in denser:
                 raise
-            denser.add(error.target)
-            sides = {
+            denser.add(name)
+            sides: dict[str, list[EndConfiguration]] = {
                 side: list(dict.fromkeys(getattr(each, side) for each in candidates))
-                for side in ("start", "goal")
+                for side in SIDES
             }
-            sides[error.target] = denser_ends(
+            sides[name] = denser_ends(
                 prepared,
-                error.target,
-                getattr(prepared.problem, error.target),
-                sides[error.target],
+                name,
+                getattr(prepared.problem, name),
+                sides[name],
                 lambda q: are_feasible(prepared, q),
             )
-            if not sides[error.target]:
+            if not sides[name]:
                 raise
+            if prepared.problem.tool_path is not None:
+                candidates = path_candidates(prepared, sides["start"])
+                continue
         candidates = pairs(prepared, sides["start"], sides["goal"])
 
 

@@ -41,15 +41,22 @@ class PathEndSettings:
 PATH_ENDS = PathEndSettings()
 
 
-def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
-    """Trace the tool path from all start configurations, and build a candidate of each full trace.
+def path_candidates(
+    prepared: PreparedProblem, starts: Sequence[EndConfiguration] | None = None
+) -> list[Candidate]:
+    """Trace the tool path from start configurations, and build a candidate of each full trace.
+
+    Args:
+        prepared: problem with a tool path.
+        starts: start configurations; None for samples of the start.
 
     Raises:
         PathInfeasible: no configuration follows the path to its end.
     """
     course, limits = prepared.course, prepared.arm.active_limits
     assert course is not None
-    starts, _ = ends_of(prepared, "start", prepared.problem.start, SAMPLING.path_start)
+    if starts is None:
+        starts, _ = ends_of(prepared, "start", prepared.problem.start, SAMPLING.path_start)
     found, attempts = list[Candidate](), list[PathAttempt]()
     for start, trace in zip(starts, _traces(prepared, starts), strict=True):
         choices = _choices(start, trace, prepared.problem.goal)

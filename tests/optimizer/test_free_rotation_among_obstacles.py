@@ -20,6 +20,7 @@ from joulepath import (
     Scene,
     Sphere,
     Stop,
+    ToolPath,
     capsule_between,
     load_robot,
     optimize,
@@ -140,6 +141,18 @@ def test_a_stop_of_free_rotation_fits_between_two_walls() -> None:
     home, stop = np.array(STARTS["kr10_r1100"]), Stop(name="slot", target=about)
     found = plan_cycle(Cycle(arm=arm, start=home, stops=[stop], deadline=AMPLE))
     assert all(move.solution.certificate.valid for move in found.moves)
+
+
+@pytest.mark.parametrize("name", long_but(["ur5e"], STARTS))
+def test_a_path_of_free_rotation_starts_between_two_walls(name: str) -> None:
+    arm, T = slot(name, 0.2)
+    axis, ahead = np.array([0.0, 0.0, 1.0]), Pose(T @ at(np.array([0.05, 0.0, 0.0])))
+    given = Problem(arm=arm, start=Pose(T), goal=ahead, tool_path=ToolPath(), deadline=AMPLE)
+    start, path = ConeOrientedPose.about(Pose(T), axis), ToolPath(about=axis)
+    free = optimize(replace(given, start=start, tool_path=path))
+    assert free.certificate.valid
+    most = optimize(given).energy.electrical.total * (1 + SAME)
+    assert free.energy.electrical.total <= most
 
 
 @pytest.mark.long
