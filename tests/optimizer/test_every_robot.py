@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from joulepath import Arm, Pose, Problem, Robot, load_robot, optimize, robot_names
-from joulepath.optimizer.collision.model import collision_model
+from joulepath import Arm, Pose, Problem, Robot, Solution, load_robot, optimize, robot_names
+from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
+from joulepath.optimizer.collision.model import CollisionModel, collision_model
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.kinematics.angles import nearest_turn
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
@@ -86,6 +87,18 @@ def test_links_keep_apart_where_arms_are_used(name: str) -> None:
     assert model.signed_distances(np.array(EVERYDAY.get(name, EVERYDAY[robot.nq])))[0].min() > 0
 
 
+def better_in_the_reserve(answer: Solution, model: CollisionModel) -> bool:
+    """Whether a goal configuration keeps the margins, but not the reserve of the search beyond
+    them, and may need less than the answer: no motion to it is searched for, nor ruled out.
+    """
+    clearance = model.signed_distances(np.array([each.q_goal for each in answer.candidates]))[0]
+    least, reserve = clearance.min(axis=1), CLEARANCE_CONSTRAINT.reserve
+    return any(
+        0 <= distance < reserve and each.lower_bound < answer.energy.electrical.total
+        for distance, each in zip(least.tolist(), answer.candidates, strict=True)
+    )
+
+
 # 200 requests take some minutes, and more on a busy machine
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("count", long_but((4,), (4, 200)))
@@ -103,11 +116,10 @@ def test_poses_are_answered_with_a_proof(robot: Robot, count: int) -> None:
         start, goal = ends
         pose = Pose(flange(robot, goal))
         answer = optimize(Problem(arm=Arm(robot=robot), start=start, goal=pose, deadline=AMPLE))
+        assert answer.certificate.valid
         # configurations of a pose on curves are sampled: nothing is proven about other members
-        assert (
-            answer.status == ("optimal" if robot.nq == 6 else "feasible")
-            and answer.certificate.valid
-        )
+        proven = robot.nq == 6 and not better_in_the_reserve(answer, model)
+        assert answer.status == ("optimal" if proven else "feasible")
         energy = answer.energy.electrical
         assert 0 <= answer.lower_bound <= energy.total
         # zero is the only proven bound if the weight of a descending arm may pay for the motion
