@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.models.uncertainty.ranges import (
@@ -37,6 +36,7 @@ from joulepath.optimizer.identify.estimates.grouped import (
     jackknife,
     leave_one_out,
     residual_replicates,
+    solve_definite,
 )
 from joulepath.optimizer.identify.fits.own_ranges import (
     LINK_ERRORS,
@@ -230,10 +230,7 @@ def fit_power(
             slope, residuals + slope @ value, weight / noise, clusters.of_row, clusters.count
         )
         precision, target = grouped.total(prior.precision, prior.mean)
-        lower = np.linalg.cholesky(precision)
-        new = lsq_linear(
-            lower.T, np.linalg.solve(lower, target), bounds=(least, np.inf), method="bvls"
-        ).x
+        new = solve_definite(precision, target, least)
         change, value = float(np.abs(new - value).max()), new
         if iteration > 1 and change < settings.step_tolerance * (1 + np.abs(value).max()):
             break
