@@ -124,7 +124,7 @@ def solve_other_durations(state: SearchState) -> None:
     a fixed duration also end in different local minima.
     """
     problem, best = state.problem, state.best()
-    is_sought = problem.objective == "mechanical" and not state.known
+    is_sought = problem.objective == "mechanical"
     if not is_sought or state.other_durations_solved or best is None:
         return
     state.other_durations_solved, longest = True, problem.duration_max
