@@ -26,6 +26,7 @@ from joulepath import (
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from tests.models.own_arm.arms import robot
 from tests.optimizer.few_joints import DESK, description_of
+from tests.optimizer.moves import AMPLE
 from tests.selection import long_but
 
 HOME = np.array([0.2, -0.4, 0.9, 0.5, 0.3])
@@ -160,7 +161,7 @@ def test_a_cycle_through_poses(arm: Arm, kind: str) -> None:
         "pose": [there, home],
     }[kind]
     stops = [Stop(name=f"stop_{k}", target=each) for k, each in enumerate(targets)]
-    found = plan_cycle(Cycle(arm=arm, start=HOME, stops=stops, windings=False, deadline=15))
+    found = plan_cycle(Cycle(arm=arm, start=HOME, stops=stops, windings=False, deadline=AMPLE))
     assert all(move.solution.certificate.valid for move in found.moves)
     assert 0 < found.lower_bound <= found.energies.of("electrical")
     assert found.status == "feasible" and not found.complete
