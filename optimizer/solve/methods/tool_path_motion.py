@@ -166,7 +166,9 @@ class ToolPathMotion(Method):
     ) -> None:
         """Solve with other turnings of the tool.
 
-        The path of the best motion is kept, and no turning is chosen again.
+        The path of the best motion is kept, and no turning is chosen again. With a free angle at
+        the goal only, turnings that end at the present angle are solved, too, so that no motion
+        between fixed ends needs less.
 
         Args:
             law: times (k,) [s], and fractions (k,) of the path, with which turnings are compared.
@@ -177,6 +179,9 @@ class ToolPathMotion(Method):
         prepared, best, q_start = self.prepared, least, self.q_start
         assert prepared.course is not None
         prepared.followed.mark_turnings_searched(q_start)
+        held, first_law = list[tuple[Trace, Spline]](), law
+        if prepared.course.free_sides == ["goal"]:
+            held += turned_paths(prepared, q_start, self.q_goal, *law, hold_goal=True)
 
         def is_best(trace: Trace, path: Spline, result: SolveResult) -> bool:
             nonlocal best
@@ -201,6 +206,8 @@ class ToolPathMotion(Method):
                     q_start, law = trace.q[0], own
         for trace, path in turned_paths(prepared, q_start, self.q_goal, *law):
             is_best(trace, path, self._clear_along(path, scaling, law))
+        for trace, path in held:
+            is_best(trace, path, self._clear_along(path, scaling, first_law))
 
     def _at_best_angle(
         self, turned: TurnedAtEnd, results: list[SolveResult]

@@ -30,6 +30,7 @@ from joulepath.optimizer.kinematics.tool_path.course_tracing import (
     within,
 )
 from joulepath.optimizer.kinematics.tool_path.joint_path import joint_path
+from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.kinematics.tool_path.turning_grid import (
     TURNING_GRID,
     TurningGrid,
@@ -85,7 +86,12 @@ TOOL_TURNING = ToolTurningSettings()
 
 
 def turned_paths(
-    prepared: PreparedProblem, q_start: Array, q_goal: Array, t: Array, s: Array
+    prepared: PreparedProblem,
+    q_start: Array,
+    q_goal: Array,
+    t: Array,
+    s: Array,
+    hold_goal: bool = False,
 ) -> Iterator[tuple[Trace, Spline]]:
     """Paths with turnings of the tool that are expected to cost less, the better one last.
 
@@ -97,11 +103,15 @@ def turned_paths(
         q_goal: goal configuration, shape (nq,) [rad].
         t: times of a motion, shape (k,) [s].
         s: fractions of the course at these times, shape (k,).
+        hold_goal: whether the turnings end in q_goal even at a free end.
 
     Yields:
         Trace and joint path of a turning.
     """
-    law, known = _TimeLaw(prepared, q_start, s, t), _known(prepared, q_start)
+    assert prepared.course is not None
+    free_end = prepared.course.free_end and not hold_goal
+    law = _TimeLaw(prepared, replace(prepared.course, free_end=free_end), q_start, s, t)
+    known = _known(prepared, q_start)
     wanted, coarse = None if law.course.free_end else q_goal, law.coarse()
     for turning in (coarse, law.refined(coarse or known)):
         followed = None if turning is None else _followed(prepared, q_start, wanted, turning)
@@ -193,9 +203,10 @@ def _first_of(prepared: PreparedProblem, q_start: Array, turning: CubicSpline) -
 class _TimeLaw:
     """A course with a time law: fractions s (k,) of the course at times t (k,) [s]."""
 
-    def __init__(self, prepared: PreparedProblem, q_start: Array, s: Array, t: Array) -> None:
-        assert prepared.course is not None
-        self.prepared, self.course, self.q_start = prepared, prepared.course, q_start
+    def __init__(
+        self, prepared: PreparedProblem, course: ToolCourse, q_start: Array, s: Array, t: Array
+    ) -> None:
+        self.prepared, self.course, self.q_start = prepared, course, q_start
         self.chain = chain_of(prepared.arm.robot)
         self.s, self.t = s, t
         self.times = np.linspace(0.0, t[-1], TOOL_TURNING.instants)
