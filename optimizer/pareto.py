@@ -1,7 +1,8 @@
 """Public entry point: `pareto(problem, points)` finds the front of energy and duration.
 
 The last point is the answer of `optimize`. A motion with less energy only within the scatter of
-solves is the same optimum.
+solves is the same optimum. If a motion of another duration needs still less, as between sampled
+ends, the last search starts from it.
 
 Between two neighbours the front lies within the rectangle they span: a slower motion than the left
 one is dominated unless it needs less energy, and no motion needs less energy than the right one.

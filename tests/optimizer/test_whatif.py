@@ -33,7 +33,7 @@ ROUNDING = 1e-9
 
 @pytest.fixture(scope="module")
 def asked() -> Problem:
-    return problem(deadline=30.0)
+    return problem()
 
 
 @pytest.fixture(scope="module")
