@@ -1,8 +1,7 @@
 """Public entry point: `pareto(problem, points)` finds the front of energy and duration.
 
-The last point is the answer of `optimize`. A motion with less energy only within the scatter of
-solves is the same optimum. If a motion of another duration needs still less, as between sampled
-ends, the last search starts from it.
+The last point is the answer of `optimize`, or of a search from a motion of less energy. A motion
+with less energy only within the scatter of solves is the same optimum.
 
 Between two neighbours the front lies within the rectangle they span: a slower motion than the left
 one is dominated unless it needs less energy, and no motion needs less energy than the right one.
