@@ -179,7 +179,8 @@ def _cycle(found: _Cycle, arm: ArmRequest | None, moves: list[dict[str, Any]]) -
             steps.append(_move(next(answers), None, f"{leg.start.stop} to {leg.goal.stop}"))
         else:
             steps.append(Rest(leg.duration, f"{leg.kind} at {leg.goal.stop}"))
-    if found.payload_at_end is not None:
+    # a cycle without moves is refused by the program
+    if found.payload_at_end is not None and moves:
         left = arm_of({}, moves[-1], payload=found.payload_at_end).payload
         steps = with_payload_at_end(steps, left)
     return Program(tuple(steps))
