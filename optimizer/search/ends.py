@@ -63,7 +63,7 @@ class SamplingSettings:
     """The same for a motion of a redundant arm. With 4 members of a self-motion, obstacles hide
     whole branches: a quarter of the goals with a free rotation needed more energy than with a given
     rotation, up to twice as much."""
-    path_start: SampleCounts = SampleCounts(orientations=48, turns=12, members=4)
+    path_start: SampleCounts = SampleCounts(orientations=48, turns=12, members=8)
     """Numbers of samples of the start of a tool path."""
     least_orientations: int = 12
     """Least number of orientations sampled of one pose."""
