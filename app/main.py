@@ -13,8 +13,11 @@ from starlette.middleware.cors import CORSMiddleware
 from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
-from joulepath.app.api import docs, health, metrics, pages, problems, searches
+from joulepath.app.api import docs, health, metrics, pages, problems
+from joulepath.app.api.advice import route as advice
 from joulepath.app.api.answers import route as answers
+from joulepath.app.api.compare import route as compare
+from joulepath.app.api.cycle import route as cycle
 from joulepath.app.api.evaluate import route as evaluate
 from joulepath.app.api.excitation import route as excitation
 from joulepath.app.api.export import route as export
@@ -23,6 +26,9 @@ from joulepath.app.api.identifications import route as identifications
 from joulepath.app.api.ik import route as ik
 from joulepath.app.api.jobs import route as jobs
 from joulepath.app.api.logs import route as logs
+from joulepath.app.api.optimize import route as optimize
+from joulepath.app.api.pareto import route as pareto
+from joulepath.app.api.placement import route as placement
 from joulepath.app.api.replay import route as replay
 from joulepath.app.api.report import route as report
 from joulepath.app.api.robots import files as robot_files
@@ -31,6 +37,7 @@ from joulepath.app.api.studies import route as studies
 from joulepath.app.api.studies.iterations import route as iterations
 from joulepath.app.api.studies.suggest import route as suggest
 from joulepath.app.api.tools import route as tools
+from joulepath.app.api.whatif import route as whatif
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.warm_up import warm
@@ -47,7 +54,13 @@ from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
 
 ROUTES = (
-    searches,
+    optimize,
+    compare,
+    pareto,
+    cycle,
+    placement,
+    whatif,
+    advice,
     evaluate,
     replay,
     ik,
