@@ -1,4 +1,4 @@
-"""Orientations of the tool tried at stops among obstacles, some of them without collisions."""
+"""Orientations of the tool at stops of partly free orientation among obstacles."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.search.ends import ends_of
-from joulepath.optimizer.search.free_members import denser_ends
+from joulepath.optimizer.search.free_members import denser_ends, evenly_chosen
 
 
 def free_turns(cycle: Cycle, stop: Stop) -> list[Turns]:
-    """Turns at a stop over all orientations, or else over those without collisions.
+    """Turns of the tool at a stop, spread evenly over all allowed orientations.
 
-    If the arm collides at all turns spread over the orientations, turns without collisions are
-    sought among denser ones. If there are none either, the former are returned.
+    If the arm collides at every one of these turns, denser turns are checked, and some of the
+    collision-free ones are returned. Without any, the result is the colliding turns, for which the
+    search reports the collision.
 
     Raises:
         UnreachableTargets: the stop is out of reach at all turns.
@@ -34,7 +35,7 @@ def free_turns(cycle: Cycle, stop: Stop) -> list[Turns]:
         return turns
     if not cycle.arm.scene.names:
         return turns
-    name, arm, tried = f"stops/{stop.name}", cycle.arm, turned_poses(pose, turns)
+    name, tried = f"stops/{stop.name}", turned_poses(pose, turns)
     rests = rests_at(cycle, ModelsOfArms(), stop.name, tried, stop.branch)
 
     def are_free(q: Array) -> Mask:
@@ -45,7 +46,6 @@ def free_turns(cycle: Cycle, stop: Stop) -> list[Turns]:
         return turns
     denser = denser_ends(rests[0], name, pose, [], are_free)
     (reference,) = sample_orientations(pose, 1)
-    found = [tcp_pose(arm, end.q)[:3, :3] for end in denser]
-    chosen = found[:: max(len(found) // len(TOOL_TURNS.angles), 1)][: len(TOOL_TURNS.angles)]
-    none = np.zeros(3)
-    return [(np.asarray(pin.log3(reference.T @ R)), none) for R in chosen] or turns
+    chosen = evenly_chosen(denser, len(TOOL_TURNS.angles))
+    rotations = [tcp_pose(cycle.arm, end.q)[:3, :3] for end in chosen]
+    return [(np.asarray(pin.log3(reference.T @ R)), np.zeros(3)) for R in rotations] or turns

@@ -65,6 +65,9 @@ class SamplingSettings:
     rotation, up to twice as much."""
     path_start: SampleCounts = SampleCounts(orientations=48, turns=12, members=8)
     """Numbers of samples of the start of a tool path."""
+    dense: SampleCounts = SampleCounts(orientations=384, turns=192, members=16)
+    """Numbers of samples of an end that collides at all coarse samples. About an axis, the
+    orientations of a single pose are two degrees apart."""
     least_orientations: int = 12
     """Least number of orientations sampled of one pose."""
     least_members: int = 4

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,9 +17,11 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.targets import Target, members
 from joulepath.optimizer.search.candidates import Candidate, bound, pairs
 from joulepath.optimizer.search.end_feasibility import are_feasible
-from joulepath.optimizer.search.ends import SAMPLING, SIDES, SampleCounts, ends_of
+from joulepath.optimizer.search.ends import SAMPLING, SIDES, ends_of
 from joulepath.optimizer.search.errors import InCollision
 from joulepath.optimizer.search.path_ends import path_candidates
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -33,9 +36,6 @@ class FreeMemberSettings:
 
 
 FREE_MEMBERS = FreeMemberSettings()
-DENSE = SampleCounts(orientations=384, turns=192, members=16)
-"""Numbers of samples of poses of partly free orientation that are checked: the orientations about
-an axis are two degrees apart."""
 
 
 def bounded(prepared: PreparedProblem, candidates: list[Candidate]) -> list[Candidate]:
@@ -77,10 +77,11 @@ def bounded(prepared: PreparedProblem, candidates: list[Candidate]) -> list[Cand
             )
             if not sides[name]:
                 raise
-            if prepared.problem.tool_path is not None:
-                candidates = path_candidates(prepared, sides["start"])
-                continue
-        candidates = pairs(prepared, sides["start"], sides["goal"])
+        candidates = (
+            pairs(prepared, sides["start"], sides["goal"])
+            if prepared.problem.tool_path is None
+            else path_candidates(prepared, sides["start"])
+        )
 
 
 def denser_ends(
@@ -130,7 +131,16 @@ def _free_orientations(
     """Free configurations of the poses of partly free orientation of a target."""
     if not any(isinstance(each, ConeOrientedPose) for each in members(target)):
         return []
-    ends = [end for end in ends_of(prepared, name, target, DENSE)[0] if end.tolerance is not None]
+    ends = [
+        end
+        for end in ends_of(prepared, name, target, SAMPLING.dense)[0]
+        if end.tolerance is not None
+    ]
     free = np.flatnonzero(are_free(np.array([end.q for end in ends])))
-    step = max(len(free) // FREE_MEMBERS.most_of_orientations, 1)
-    return [ends[k] for k in free[::step].tolist()]
+    return [ends[k] for k in evenly_chosen(free.tolist(), FREE_MEMBERS.most_of_orientations)]
+
+
+def evenly_chosen(items: Sequence[T], most: int) -> list[T]:
+    """At most `most` items, evenly spread over their order."""
+    count = min(len(items), most)
+    return [items[k * len(items) // count] for k in range(count)]

@@ -4,9 +4,11 @@ Samples of the orientation lie far apart on the manifold of goal configurations,
 joints the arm has. So every sample moves over the manifold to the nearest shortest path from the
 start, in displacements weighted by friction. There are few such places. Of these places, the
 samples, and the samples with a joint turned the other way, configurations of locally least expected
-energy are solved. If the place of a sample collides with the scene, a configuration between both
-takes its place, in a second choice: such configurations are close to obstacles and may be hard to
-reach, so they do not displace others.
+energy are solved.
+
+If the place to which a sample moves collides with the scene, the sample moves only part of the way.
+Such configurations are close to obstacles and may be hard to reach. They are therefore chosen
+separately, in addition to the others.
 """
 
 from __future__ import annotations
