@@ -1,9 +1,10 @@
 """Refinement of the best samples of goals that infinitely many configurations reach.
 
-The configurations of a goal of partly free orientation form a manifold. From the best solved
-samples, the goal configuration becomes a decision variable of the nonlinear program, restricted to
-the tangent space of the goal manifold. Inverse kinematics projects the new goal onto the manifold,
-and the motion is solved again with this goal fixed, until the energy no longer decreases.
+The configurations of a goal of partly free orientation, or of a goal on a self-motion, form a
+manifold. From the best solved samples, the goal configuration becomes a decision variable of the
+nonlinear program, restricted to the tangent space of the goal manifold. Inverse kinematics projects
+the new goal onto the manifold, and the motion is solved again with this goal fixed, until the
+energy no longer decreases.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.orientation_tolerance import tilt
 from joulepath.optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
 from joulepath.optimizer.motion import bspline
@@ -66,6 +68,7 @@ class GoalRefinementSettings:
 
 GOALS = GoalRefinementSettings()
 REFINED_GOAL = "converged; goal orientation refined from a sampled orientation"
+REFINED = "converged; refined along the self-motion that holds the pose"
 
 
 def refine_goals(state: SearchState) -> list[Candidate]:
@@ -82,11 +85,11 @@ def refine_goals(state: SearchState) -> list[Candidate]:
     return refine_best(
         solved,
         lambda each: (each.start.label, each.goal.label, each.goal.target),
-        lambda each: _refined(state, each),
+        lambda each: refine_goal(state, each),
     )
 
 
-def _refined(state: SearchState, candidate: Candidate) -> Candidate:
+def refine_goal(state: SearchState, candidate: Candidate) -> Candidate:
     """The candidate with its goal moved over the goal set while the energy decreases.
 
     It is the candidate itself if the energy never decreases.
@@ -134,18 +137,37 @@ def _moved(
     for share in GOALS.step_shares:
         # the set may bend out of a limit that the proposed goal is on
         asked = candidate.q_goal + share * (guess.points[-1] - candidate.q_goal)
-        found = nearest_configuration(state.prepared, candidate.goal, asked)
+        found = _nearest_goal(state, candidate, asked)
         if found is not None:
-            return _solved(state, candidate, found, guess), promised
+            return _solved(state, candidate, *found, guess), promised
     return None, promised
 
 
+def _nearest_goal(
+    state: SearchState, candidate: Candidate, q: Array
+) -> tuple[EndConfiguration, Array] | None:
+    """The nearest configuration (nq,) of a candidate's goal to q (nq,), with its end.
+
+    None if it is outside of the limits. Where two curves of a redundant arm meet, it may be on the
+    other curve.
+    """
+    ends = {candidate.goal.self_motion: candidate.goal}
+    if candidate.goal.self_motion is not None:
+        for each in state.candidates:
+            if each.goal.self_motion is not None and each.goal.target == candidate.goal.target:
+                ends.setdefault(each.goal.self_motion, each.goal)
+    near = [(end, nearest_configuration(state.prepared, end, q)) for end in ends.values()]
+    held = [(end, at) for end, at in near if at is not None]
+    return min(held, key=lambda each: float(np.abs(each[1] - q).max()), default=None)
+
+
 def _solved(
-    state: SearchState, candidate: Candidate, q_goal: Array, guess: Guess
+    state: SearchState, candidate: Candidate, end: EndConfiguration, q_goal: Array, guess: Guess
 ) -> Candidate | None:
     """The candidate with another goal (nq,) [rad], solved; None if it has no motion."""
     prepared = state.prepared
-    fresh = with_ends(prepared, candidate, candidate.q_start, q_goal)
+    to_end = Candidate(candidate.start, end, candidate.q_start, candidate.q_goal)
+    fresh = with_ends(prepared, to_end, candidate.q_start, q_goal)
     if fresh is None:
         return None
     solver = solver_of(state, fresh, interval_around(prepared, q_goal, guess.duration))
@@ -156,7 +178,9 @@ def _solved(
         if solver.free_control_points
         else solver.solve()
     )
-    return settled(state, fresh, result, REFINED_GOAL)
+    return settled(
+        state, fresh, result, REFINED_GOAL if candidate.goal.self_motion is None else REFINED
+    )
 
 
 def _proposal(
@@ -181,8 +205,10 @@ def _proposal(
     )
     interval = interval_around(prepared, candidate.q_goal, spline.duration)
     pose = candidate.goal.tolerance
-    assert pose is not None
-    allowed = goal_constraints(prepared, pose, candidate.q_goal, radius)
+    if pose is None:
+        allowed = held_pose(prepared, candidate.q_goal, radius)
+    else:
+        allowed = goal_constraints(prepared, pose, candidate.q_goal, radius)
     program = NonlinearProgram(
         prepared.kernel,
         space,
@@ -202,6 +228,15 @@ def _proposal(
     if not result.feasible:
         return None, np.inf
     return Guess(space, program.points(result.free), result.duration), result.cost
+
+
+def held_pose(prepared: PreparedProblem, q_goal: Array, radius: float) -> GoalConstraints:
+    """Allowed changes of a goal (nq,) to first order if the TCP keeps its pose: along the
+    self-motion.
+    """
+    return GoalConstraints(
+        tcp_jacobian(prepared.problem.arm, q_goal), np.zeros(6), np.zeros(6), radius
+    )
 
 
 def goal_constraints(

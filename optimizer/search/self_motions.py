@@ -1,12 +1,14 @@
 """Refinement of the best samples on self-motions, for ends that do not slide.
 
-Such ends are those of a singular arm, and of methods other than the free spline. The parameter of
-the self-motion moves in steps while the energy decreases. Each step is solved as a candidate of its
-own, and steps are halved until they no longer matter.
+The posture at the goal of a singular arm is an unknown of the program, as in `free_goal`. At the
+start, and for methods other than the free spline, the parameter of the self-motion moves in steps
+while the energy decreases. Each step is solved as a candidate of its own, and steps are halved
+until they no longer matter.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +18,7 @@ from joulepath.optimizer.problem.targets import Side
 from joulepath.optimizer.search.attempts import settled, solve
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import SAMPLING
+from joulepath.optimizer.search.free_goal import REFINED, refine_goal
 from joulepath.optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
 from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.search.state import SearchState
@@ -27,12 +30,11 @@ class SelfMotionSettings:
 
     first_step: float = np.pi / SAMPLING.members
     """First step of a parameter [rad]: half the distance of two samples on a whole circle."""
-    least_step: float = 1e-2
+    least_step: float = 2e-3
     """Least step of a parameter [rad]."""
 
 
 SELF_MOTIONS = SelfMotionSettings()
-REFINED = "converged; refined along the self-motion that holds the pose"
 
 
 def refine(state: SearchState) -> list[Candidate]:
@@ -55,8 +57,17 @@ def refine(state: SearchState) -> list[Candidate]:
             each.start.label,
             each.goal.label,
         ),
-        lambda each: _descend(state, each),
+        lambda each: _moved_along(state, each),
     )
+
+
+def _moved_along(state: SearchState, candidate: Candidate) -> Candidate:
+    """The candidate with its ends moved along their self-motions; itself if no step is better."""
+    sides = _sides(candidate)
+    if state.method.free_control_points and "goal" in sides:
+        candidate = refine_goal(state, candidate)
+        sides.remove("goal")
+    return _descend(state, candidate, sides)
 
 
 def _sides(candidate: Candidate) -> list[Side]:
@@ -69,13 +80,13 @@ def _sides(candidate: Candidate) -> list[Side]:
     return sides
 
 
-def _descend(state: SearchState, candidate: Candidate) -> Candidate:
-    """The candidate of least energy found along the self-motions of its ends, by a pattern search.
+def _descend(state: SearchState, candidate: Candidate, sides: Sequence[Side]) -> Candidate:
+    """The candidate of least energy found along the self-motions of some ends, by a pattern search.
 
     It is the candidate itself if no step is better.
     """
-    best, step, sides = candidate, SELF_MOTIONS.first_step, _sides(candidate)
-    while step > SELF_MOTIONS.least_step and not state.deadline.passed:
+    best, step = candidate, SELF_MOTIONS.first_step
+    while sides and step > SELF_MOTIONS.least_step and not state.deadline.passed:
         steps = [(side, sign * step) for side in sides for sign in (1, -1)]
         tried = (_moved(state, best, side, by) for side, by in steps)
         better = next(

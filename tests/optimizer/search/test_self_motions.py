@@ -28,7 +28,7 @@ START = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 STRETCHED = np.array([0.6, -1.2, 1.3, -0.8, 0.0, 0.4])  # wrist
 STRAIGHT = np.array([0.6, -1.3, 0.0, -1.2, -1.2, 0.3])  # elbow
 UPRIGHT = np.array([0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0])  # shoulder, elbow and wrist
-# relative: the least step along a self-motion, 0.01 rad, and the solver's tolerance
+# relative: the least step along a self-motion, 0.002 rad, and the solver's tolerance
 REFINED = 1e-3
 # relative difference of the energies of neighbouring poses
 CONTINUOUS = 0.01
