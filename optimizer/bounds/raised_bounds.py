@@ -12,7 +12,7 @@ A raised bound is at most the plain bound of full turns without a candidate (`om
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 from typing import Protocol
@@ -33,26 +33,6 @@ from joulepath.optimizer.problem.problem import DURATIONS
 
 
 @dataclass(frozen=True)
-class RaisingStage:
-    """An effort for pairs whose gap is wide."""
-
-    effort: Effort
-    gap: float
-    """Relative gap between the energy and the bound above which a pair is raised."""
-
-
-TIGHT = Effort(
-    steps=64,
-    cell_ratio=1.01,
-    cells_per_group=4,
-    spacing=Spacing(0.08, 1.2),
-    loaded_joints=(3, 2, 1),
-    weight_rounds=2,
-    time=0.4,
-)
-
-
-@dataclass(frozen=True)
 class RaisingSettings:
     """Settings of the raising of bounds."""
 
@@ -60,8 +40,10 @@ class RaisingSettings:
     """Largest number of pairs that a stage raises, unless the bound is to be tight."""
     least_gap: float = 0.03
     """Relative gap that is left below the energy, unless the bound is to be tight."""
-    quick: RaisingStage = RaisingStage(
-        Effort(
+    wide_gap: float = 0.05
+    """Relative gap below the energy above which a stage raises a pair."""
+    quick: Effort = field(
+        default_factory=lambda: Effort(
             steps=12,
             cell_ratio=1.04,
             cells_per_group=12,
@@ -69,12 +51,11 @@ class RaisingSettings:
             loaded_joints=(2,),
             weight_rounds=0,
             time=0.1,
-        ),
-        gap=0.05,
+        )
     )
-    """First stage."""
-    thorough: RaisingStage = RaisingStage(
-        Effort(
+    """Effort of the first stage."""
+    thorough: Effort = field(
+        default_factory=lambda: Effort(
             steps=24,
             cell_ratio=1.03,
             cells_per_group=8,
@@ -82,11 +63,20 @@ class RaisingSettings:
             loaded_joints=(2,),
             weight_rounds=1,
             time=0.1,
-        ),
-        gap=0.08,
+        )
     )
-    """Second stage."""
-    tight: Effort = TIGHT
+    """Effort of the second stage."""
+    tight: Effort = field(
+        default_factory=lambda: Effort(
+            steps=64,
+            cell_ratio=1.01,
+            cells_per_group=4,
+            spacing=Spacing(0.08, 1.2),
+            loaded_joints=(3, 2, 1),
+            weight_rounds=2,
+            time=0.4,
+        )
+    )
     """Effort for every pair if the bound is to be tight, after the effort of the first stage."""
 
 
@@ -141,16 +131,16 @@ def raised_bounds(
         for k in below
         if not candidates[k].sampled and bounds[k] < target
     }
-    for stage in (RAISING.quick, RAISING.thorough):
+    for effort in (RAISING.quick, RAISING.thorough):
         for pair in _lowest_pairs(list(pairs.values())):
-            if pair.bound >= energy - stage.gap * abs(energy):
+            if pair.bound >= energy - RAISING.wide_gap * abs(energy):
                 break
-            pair.raise_bound(stage.effort, deadline)
+            pair.raise_bound(effort, deadline)
     for k, pair in pairs.items():
         bounds[k] = pair.bound
     if prepared.problem.bound == "tight":
         pairs = {k: _RaisedPair(shared, candidates[k], energy, bounds[k]) for k in below}
-        for effort in (RAISING.quick.effort, RAISING.tight):
+        for effort in (RAISING.quick, RAISING.tight):
             for pair in sorted(pairs.values(), key=lambda each: each.bound):
                 pair.raise_bound(effort, deadline)
         for k, pair in pairs.items():

@@ -108,8 +108,8 @@ def test_turns_that_are_no_candidates_are_bounded_too(bound: str) -> None:
 def test_nothing_changes_where_it_does_not_apply() -> None:
     for given, deadline, energy in (
         ({"objective": "mechanical", "duration_max": 3.0}, NEVER, ENOUGH),
-        ({}, Deadline.after(RAISING.quick.effort.time / 2), ENOUGH),
-        ({"bound": "tight"}, Deadline.after(RAISING.quick.effort.time / 2), ENOUGH),
+        ({}, Deadline.after(RAISING.quick.time / 2), ENOUGH),
+        ({"bound": "tight"}, Deadline.after(RAISING.quick.time / 2), ENOUGH),
         ({"bound": "plain"}, NEVER, ENOUGH),
         ({}, NEVER, -1.0),
     ):
@@ -122,17 +122,17 @@ def test_nothing_changes_where_it_does_not_apply() -> None:
 def test_no_bound_is_begun_that_would_end_late() -> None:
     """Raising starts only if it ends before the deadline, and more joints take more time."""
     made, found = bounded(problem(OUT, TURNED, robot=load_robot("ur20")))
-    plain, left = found[0].lower_bound, 2 * RAISING.quick.effort.time
-    raise_all(made, found, ENOUGH, Deadline.after(RAISING.quick.effort.time / 2))
+    plain, left = found[0].lower_bound, 2 * RAISING.quick.time
+    raise_all(made, found, ENOUGH, Deadline.after(RAISING.quick.time / 2))
     assert found[0].lower_bound == plain
     raise_all(made, found, ENOUGH, Deadline.after(left, lambda: 0.0))
     assert found[0].lower_bound > plain
     assert (
-        RAISING.quick.effort.time_for(6)
-        == RAISING.quick.effort.time
+        RAISING.quick.time_for(6)
+        == RAISING.quick.time
         < left
-        < RAISING.quick.effort.time_for(7)
-        < RAISING.quick.effort.time_for(8)
+        < RAISING.quick.time_for(7)
+        < RAISING.quick.time_for(8)
     )
 
 
