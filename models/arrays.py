@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from joulepath.models.immutable import numbers
 from joulepath.models.robot import Array
 
 
@@ -18,10 +19,7 @@ def read_only(values: object, shape: tuple[int, ...], name: str) -> Array:
     Raises:
         ValueError: the values are not numbers, not finite, or of another shape.
     """
-    try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be numbers.") from None
+    array = np.array(numbers(values, name))
     if array.ndim != len(shape) or any(
         want not in (-1, got) for want, got in zip(shape, array.shape, strict=True)
     ):

@@ -20,6 +20,20 @@ def read_only_view(array: npt.NDArray[T]) -> npt.NDArray[T]:
     return array
 
 
+def numbers(values: object, name: str) -> npt.NDArray[np.float64]:
+    """An array of real numbers, infinities included; `values` itself if it is one.
+
+    Raises:
+        ValueError: the values are not numbers; the message begins with `name`.
+    """
+    try:
+        if isinstance(values, np.ndarray) and np.iscomplexobj(values):
+            raise TypeError
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} must be numbers.") from None
+
+
 class ReadOnlyArrays:
     """Base of frozen dataclasses with read-only array fields, also after pickling and copying.
 

@@ -61,8 +61,13 @@ def mjcf(robot: Robot) -> str:
         The text of the file; `mujoco.MjModel.from_xml_string` reads it.
 
     Raises:
+        TypeError: `robot` is no Robot.
         ValueError: a link has no mass; MuJoCo would reject the file.
     """
+    if not isinstance(robot, Robot):
+        raise TypeError(
+            f"robot must be of type Robot, not {type(robot).__name__}: give load_robot(name)."
+        )
     for name, body in zip(robot.link_names[1:], list(robot.model.inertias)[1:], strict=True):
         if not body.mass > 0:
             raise ValueError(f"Link {name!r} has no mass: a simulated link needs one.")

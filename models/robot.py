@@ -15,6 +15,7 @@ from joulepath.models.coupling import UNCOUPLED, Coupling
 from joulepath.models.immutable import (
     ReadOnlyArrays,
     ReadOnlyDict,
+    numbers,
     read_only_document,
     read_only_view,
 )
@@ -36,7 +37,7 @@ class Limits(ReadOnlyArrays):
     """Joint limits in SI units, arrays of shape (nq,).
 
     All limits are symmetric, except `q_min` and `q_max`. `tau_max` limits the torque of the motor
-    or of the link, as the robot's `torque_side` says.
+    or of the link, as the robot's `torque_side` says. Raises ValueError if one is no numbers.
     """
 
     q_min: Array
@@ -46,6 +47,11 @@ class Limits(ReadOnlyArrays):
     j_max: Array
     tau_max: Array
 
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            object.__setattr__(self, name, numbers(value, name))
+        super().__post_init__()
+
     @cached_property
     def rates(self) -> Array:
         """Limits on speed, acceleration and jerk, (3, nq)."""
@@ -54,14 +60,8 @@ class Limits(ReadOnlyArrays):
     def scaled(self, factors: Limits | float) -> Limits:
         """Limits with speed, acceleration, jerk and torque scaled, by one factor or per joint."""
         rates = ("v_max", "a_max", "j_max", "tau_max")
-        return replace(
-            self,
-            **{
-                n: getattr(self, n)
-                * (getattr(factors, n) if isinstance(factors, Limits) else factors)
-                for n in rates
-            },
-        )
+        by = {n: getattr(factors, n) if isinstance(factors, Limits) else factors for n in rates}
+        return replace(self, **{n: getattr(self, n) * by[n] for n in rates})
 
     def tightened(self, **given: Array | None) -> Limits:
         """Limits with some of the arrays replaced; the caller ensures tighter values."""

@@ -172,7 +172,7 @@ def compare(
         InvalidProblem: `methods` is empty, names a method twice, or an unknown one.
         JoulepathError: no method found a motion; the error of the first of `methods`.
     """
-    if not methods or len(set(methods)) < len(methods) or not set(methods) <= METHODS.keys():
+    if not methods or len(set(methods)) < len(methods):
         raise InvalidProblem(
             "methods", f"methods must name some of {', '.join(METHODS)}, each once."
         )

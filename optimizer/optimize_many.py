@@ -12,7 +12,9 @@ from typing import Protocol
 
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.declared_types import check_type
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scalars import check_number
 from joulepath.optimizer.result.solution import Solution
 
 
@@ -71,8 +73,11 @@ def optimize_many(
         The outcome of every problem, in any order.
 
     Raises:
+        InvalidProblem: `problems` is no iterable, or `workers` no positive number.
         BrokenProcessPool: a process died.
     """
+    check_type("problems", problems, Iterable)
+    check_number("workers", workers, least=1, optional=True)
     if client is not None:
         yield from _solved_by(
             client if isinstance(client, Executor) else client.get_executor(), problems

@@ -104,9 +104,9 @@ def test_compare() -> None:
 
 @pytest.mark.parametrize("methods", [[], ["bspline", "bspline"], ["simplex"]])
 def test_compare_refuses_methods_that_are_none(methods: list[typing.Any]) -> None:
-    with pytest.raises(joulepath.InvalidProblem, match="methods must name") as caught:
+    with pytest.raises(joulepath.InvalidProblem, match=r"^methods(\.0)? must") as caught:
         joulepath.compare(problem(), methods)
-    assert caught.value.field == "methods"
+    assert caught.value.field.startswith("methods")
 
 
 def test_inverse_kinematics() -> None:

@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Self
 
-from joulepath.app.client.encoding import json_text, key_header, part
+from joulepath.app.client.encoding import base_url, json_text, key_header, part
 from joulepath.app.client.errors import Json, ServiceUnreachable, error_in, json_in
 from joulepath.app.client.waiting import ended
 from joulepath.optimizer.presentation.extras import required
@@ -18,8 +18,7 @@ class Client:
 
     Requests are dictionaries, or keyword arguments, with the fields of the HTTP contract; answers
     are the dictionaries of its JSON. Errors are the library's own, such as `UnreachablePose`, or
-    those of the service, such as `InvalidRequest`; each is a `JoulepathError`. Their data are plain
-    values.
+    those of the service, such as `InvalidRequest`; each is a `JoulepathError` with plain data.
 
         client = joulepath.Client("http://127.0.0.1:8000")
         answer = client.optimize(robot="ur10e", start={"q": […]}, goal={"pose": {…}})
@@ -37,10 +36,11 @@ class Client:
                 base address and timeouts are kept.
 
         Raises:
+            InvalidProblem: the address or the key is no text.
             Unauthenticated: the key has characters that no key has.
             ModuleNotFoundError: httpx is not installed.
         """
-        self._url = url.rstrip("/")
+        self._url = base_url(url)
         self._headers = key_header(key)
         self._httpx = required("httpx2", "Client", "joulepath[client]")
         # the deadline of a request bounds the time of its answer

@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import json
+from types import NoneType
 from typing import Any
 from urllib.parse import quote
 
 from joulepath.app.client.errors import error_of
 from joulepath.app.exceptions.access import WrongKey
 from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.optimizer.problem.declared_types import check_type
+
+
+def base_url(url: str) -> str:
+    """The address of the service without a slash at its end. Raises InvalidProblem."""
+    check_type("url", url, str)
+    return url.rstrip("/")
 
 
 def key_header(key: str | None) -> dict[str, str]:
     """The header with an API key; empty without a key.
 
     Raises:
+        InvalidProblem: the key is no text.
         Unauthenticated: the key has characters that a header cannot contain.
     """
+    check_type("key", key, str, NoneType)
     key = (key or "").strip()
     # httpx would repeat the key in its error
     if not (key.isascii() and key.isprintable()):

@@ -10,7 +10,8 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.option_ranges import OPTION_RANGES
-from joulepath.optimizer.problem.scalars import check_choice, check_within
+from joulepath.optimizer.problem.declared_types import check_fields
+from joulepath.optimizer.problem.scalars import check_within
 
 
 @dataclass(frozen=True)
@@ -19,16 +20,15 @@ class PointOptions:
 
     tolerance: float = 0.005
     """Deviation from the spline that determines the number of points [rad]."""
-    signs: tuple[int, ...] | None = None
+    signs: tuple[Literal[1, -1], ...] | None = None
     """Sign of each joint, 1 or -1; None for 1."""
     offsets: tuple[float, ...] | None = None
     """Offset of each joint [degrees]; None for 0."""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         check_within("tolerance", self.tolerance, OPTION_RANGES.tolerance, "radians")
-        for sign in self.signs or ():
-            check_choice("signs", sign, Literal[1, -1])
-        for offset in self.offsets or ():
+        for offset in () if self.offsets is None else self.offsets:
             check_within("offsets", offset, OPTION_RANGES.offset, "degrees")
 
     def degrees(self, q: Array) -> list[str]:

@@ -13,6 +13,8 @@ from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.motion.spline import Spline, retimed, sample
 from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.declared_types import check_fields
+from joulepath.optimizer.problem.scalars import check_number
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,9 @@ class Move:
     arm: Arm
     label: str = "move"
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
     @property
     def duration(self) -> float:
         """Duration [s]."""
@@ -48,6 +53,10 @@ class Rest:
     duration: float
     label: str = "rest"
     payload: Payload | None = None
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        check_number("duration", self.duration, "seconds")
 
 
 @dataclass(frozen=True)
@@ -79,6 +88,7 @@ class Program:
     speed_scale: float = 1.0
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if not self.steps or isinstance(self.steps[0], Rest):
             raise InvalidProblem(
                 "answer", "The answer has no motion: export one that begins with a move."

@@ -11,6 +11,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Method, Target, Term
+from joulepath.optimizer.problem.arrays import frozen
 from joulepath.optimizer.problem.declared_types import check_fields
 from joulepath.optimizer.problem.scalars import check_number
 
@@ -26,12 +27,11 @@ class Coupling:
     """Ratio of the speed of the motor to the speed of each joint, shape (nq,) [1]."""
 
     def __post_init__(self) -> None:
-        ratios = np.array(self.ratios, dtype=float)
-        if ratios.ndim != 1 or (ratios != 0).sum() < 2 or not np.isfinite(ratios).all():
+        ratios = frozen(self.ratios, (-1,), "couplings")
+        if (ratios != 0).sum() < 2:
             raise InvalidProblem(
                 "couplings", "A coupling must have a ratio other than 0 for at least two joints."
             )
-        ratios.setflags(write=False)
         object.__setattr__(self, "ratios", ratios)
 
     @property
@@ -77,14 +77,14 @@ class IdentificationOptions:
     a log without a reading. Empty: no readings."""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for name, allowed in (("fit", get_args(Target)), ("terms", get_args(Term))):
             given = tuple(getattr(self, name))
-            if not given or not set(given) <= set(allowed) or len(set(given)) < len(given):
+            if not given or len(set(given)) < len(given):
                 raise InvalidProblem(
                     name, f"{name} must name some of {', '.join(allowed)}, each once."
                 )
             object.__setattr__(self, name, given)
-        check_fields(self)
         if self.refit and self.links_unknown:
             raise InvalidProblem(
                 "inertials",
@@ -101,8 +101,8 @@ class IdentificationOptions:
             check_number(name, value, unit, least=least, most=most, optional=optional)
         object.__setattr__(self, "couplings", tuple(self.couplings))
         object.__setattr__(self, "mains", tuple(self.mains))
-        if not all(each is None or 0 < each <= 1e6 for each in self.mains):
-            raise InvalidProblem("mains", "A reading of mains must be above 0 and at most 1e6 W.")
+        for k, each in enumerate(self.mains):
+            check_number(f"mains.{k}", each, "watts", most=1e6, positive=True, optional=True)
 
     @property
     def reduced(self) -> bool:

@@ -13,7 +13,8 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.models.shape_sizes import SIZES
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.problem.arrays import placement
+from joulepath.optimizer.problem.arrays import frozen, placement
+from joulepath.optimizer.problem.declared_types import check_fields
 
 Mount = Literal["floor", "wall", "ceiling"]
 Coordinate = Literal["x", "y", "z", "yaw"]
@@ -64,12 +65,13 @@ class Region:
     mounts: Sequence[Mount] | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self, "region.")
         for name in COORDINATES:
             given = getattr(self, name)
             if given is None:
                 continue
             most = REGION_RANGES.widest_yaw if name == "yaw" else SIZES.largest
-            low, high = (float(value) for value in given)
+            low, high = frozen(given, (2,), f"region.{name}").tolist()
             if not -most <= low <= high <= most:
                 raise InvalidProblem(
                     f"region.{name}",
@@ -79,7 +81,7 @@ class Region:
             object.__setattr__(self, name, (low, high))
         if self.mounts is not None:
             mounts = tuple(dict.fromkeys(self.mounts))
-            if not mounts or not set(mounts) <= set(get_args(Mount)):
+            if not mounts:
                 raise InvalidProblem(
                     "region.mounts",
                     f"region.mounts must have at least one of {', '.join(get_args(Mount))}.",
@@ -103,6 +105,7 @@ class Places:
     poses: Sequence[Array]
 
     def __post_init__(self) -> None:
+        check_fields(self, "region.")
         if not 1 <= len(self.poses) <= REGION_RANGES.max_places:
             raise InvalidProblem(
                 "region.places",
@@ -128,6 +131,7 @@ class Group:
     obstacles: Sequence[str] = ()
 
     def __post_init__(self) -> None:
+        check_fields(self, "moves.")
         for name in ("stops", "obstacles"):
             names = tuple(getattr(self, name))
             object.__setattr__(self, name, names)

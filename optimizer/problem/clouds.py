@@ -90,13 +90,15 @@ class Voxels:
 
     def __post_init__(self) -> None:
         check_size("size", self.size)
-        cells = np.unique(np.array(self.cells, dtype=np.int64).reshape(-1, 3), axis=0)
-        _count("cells", len(cells), CLOUD_RANGES.max_voxels, "occupied cells: use larger voxels")
-        if np.abs(cells).max() > CLOUD_RANGES.max_along_edge:
+        given = np.unique(frozen(self.cells, (-1, 3), "cells"), axis=0)
+        _count("cells", len(given), CLOUD_RANGES.max_voxels, "occupied cells: use larger voxels")
+        most = CLOUD_RANGES.max_along_edge
+        if (np.abs(given) > most).any() or (given % 1 != 0).any():
             raise InvalidProblem(
-                "cells", f"cells must lie within {CLOUD_RANGES.max_along_edge} cells of the origin."
+                "cells", f"cells must be integers within {most} cells of the origin."
             )
-        _within_reach("cells", np.asarray(cells * self.size, dtype=float))
+        _within_reach("cells", given * self.size)
+        cells = given.astype(np.int64)
         cells.flags.writeable = False
         object.__setattr__(self, "cells", cells)
 

@@ -120,6 +120,7 @@ class Cycle:
 
     def __post_init__(self) -> None:
         check_search(self)
+        check_number("unsolved_excess", self.unsolved_excess)
         object.__setattr__(self, "stops", tuple(self.stops))
         if not 1 <= len(self.stops) <= CYCLE_RANGES.max_stops:
             raise InvalidProblem("stops", f"A cycle must have 1 to {CYCLE_RANGES.max_stops} stops.")

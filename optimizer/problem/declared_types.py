@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import cache, wraps
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import cache, partial, wraps
 from inspect import signature
 from types import NoneType, UnionType
-from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, NoReturn, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -31,9 +31,13 @@ _REMEDIES = {
 }
 """Remedies by the name of the declared class."""
 
+_PLAIN = (NoneType, bool, str)
+"""Types that are checked, besides the classes of this library."""
+
 
 def check_fields(asked: Any, prefix: str = "") -> None:
-    """Check the fields of a dataclass that are declared as literals or as classes of this library.
+    """Check the fields of a dataclass whose types have a check: literals, truth values, texts,
+    classes of this library, and lists.
 
     Args:
         asked: instance of the dataclass.
@@ -50,8 +54,8 @@ def check_fields(asked: Any, prefix: str = "") -> None:
 def checked_arguments(function: Callable[P, R]) -> Callable[P, R]:
     """The function with checked arguments.
 
-    Arguments that are declared as numbers, as literals or as classes of this library are checked
-    before the call. A wrong argument raises InvalidProblem with the name of the argument.
+    Numbers and all types of `check_fields` are checked before the call. A wrong argument raises
+    InvalidProblem with its name.
     """
     names = tuple(signature(function).parameters)
 
@@ -72,13 +76,16 @@ def check_type(field: str, value: object, *kinds: type) -> None:
     Raises:
         InvalidProblem: the value is of another type.
     """
-    if isinstance(value, kinds):
-        return
-    names = [kind.__name__ for kind in kinds if kind is not NoneType]
+    if not (isinstance(value, kinds) or (bool in kinds and isinstance(value, np.bool_))):
+        _refuse(field, value, "of type {}", kinds)
+
+
+def _refuse(field: str, value: object, needed: str, kinds: Sequence[Any]) -> NoReturn:
+    """Raise the error of a value that is not `needed`: of some types, or a list of their values."""
+    names = [kind.__name__ for kind in kinds if isinstance(kind, type) and kind is not NoneType]
     remedy = next((_REMEDIES[name] for name in names if name in _REMEDIES), "")
-    raise InvalidProblem(
-        field, f"{field} must be of type {' or '.join(names)}, not {type(value).__name__}{remedy}."
-    )
+    needed, given = needed.format(" or ".join(names) or "values"), type(value).__name__
+    raise InvalidProblem(field, f"{field} must be {needed}, not {given}{remedy}.")
 
 
 @cache
@@ -91,31 +98,44 @@ def _checks_of(declaring: Any) -> dict[str, Check]:
 @cache
 def _number_checks_of(function: Any) -> dict[str, Check]:
     """Checks of the arguments of a function that are numbers, by their names."""
-
-    def check(field: str, value: Any) -> None:
-        check_number(field, value, least=-np.inf, infinite=True, optional=True)
-
+    check = partial(check_number, least=-np.inf, infinite=True)
+    optional = partial(check, optional=True)
+    checks: dict[Any, Check] = {
+        int: check,
+        float: check,
+        int | None: optional,
+        float | None: optional,
+    }
     hints = get_type_hints(function).items()
-    return {name: check for name, hint in hints if hint in (int, float, float | None)}
+    return {name: checks[hint] for name, hint in hints if hint in checks}
 
 
 def _check_of(hint: Any) -> Check | None:
-    """The check of a type; None for types without a check."""
+    """The check of a type; None for types without a check, such as numbers and arrays."""
     if literals_of(hint):
         return lambda field, value: check_choice(field, value, hint)
-    is_sequence = get_origin(hint) is Sequence
-    (hint, *_) = get_args(hint) if is_sequence else (hint,)
     kinds = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
-    if not all(kind is NoneType or _is_own(kind) for kind in kinds):
-        return None
-    if not is_sequence:
+    if all(kind in _PLAIN or _is_own(kind) for kind in kinds):
         return lambda field, value: check_type(field, value, *kinds)
+    lists = [kind for kind in kinds if get_origin(kind) in (Sequence, tuple)]
+    if len(lists) == 1 and set(kinds) <= {NoneType, *lists}:
+        return _check_of_entries(get_args(lists[0])[0], optional=NoneType in kinds)
+    return None
+
+
+def _check_of_entries(hint: Any, optional: bool) -> Check:
+    """The check of a list from the type of its entries."""
+    check = _check_of(hint)
 
     def check_entries(field: str, value: Any) -> None:
-        if not isinstance(value, Sequence):
-            raise InvalidProblem(field, f"{field} must be a sequence, not {type(value).__name__}.")
-        for k, entry in enumerate(value):
-            check_type(f"{field}.{k}", entry, *kinds)
+        if optional and value is None:
+            return
+        if not isinstance(value, Collection) or isinstance(value, str | bytes | Mapping):
+            kinds = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+            _refuse(field, value, "a list of {}", kinds)
+        if check is not None:
+            for k, entry in enumerate(value):
+                check(f"{field}.{k}", entry)
 
     return check_entries
 

@@ -10,9 +10,11 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.declared_types import checked_arguments
 from joulepath.optimizer.problem.scene import Attachment, Box, Capsule, Cylinder, Mesh, Sphere
 
 
+@checked_arguments
 def even_payload(mass: float, shape: Attachment) -> Payload:
     """A payload of one density that fills its shape: a part of which mass and size are known.
 
@@ -24,7 +26,7 @@ def even_payload(mass: float, shape: Attachment) -> Payload:
         The payload, with the centre of mass and the inertia that follow.
 
     Raises:
-        InvalidProblem: no body has this mass.
+        InvalidProblem: no body has this mass, or an argument has another type.
     """
     centre, moments = _spread(shape.shape)
     R, p = shape.T_flange_shape[:3, :3], shape.T_flange_shape[:3, 3]

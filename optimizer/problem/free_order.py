@@ -9,6 +9,7 @@ from itertools import pairwise
 
 from joulepath.optimizer.exceptions import ContradictoryOrder, InvalidProblem
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.declared_types import check_fields
 from joulepath.optimizer.problem.stops import Stop
 
 MOST_FREE_STOPS = 12
@@ -22,10 +23,16 @@ class FreeOrder:
     Attributes:
         before: pairs of stops; the first of a pair comes earlier than the second.
         together: lists of stops visited directly after one another, in this order.
+
+    Raises:
+        InvalidProblem: a field is no list of names.
     """
 
     before: Sequence[tuple[str, str]] = ()
     together: Sequence[Sequence[str]] = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 def groups_of(order: FreeOrder, stops: Sequence[Stop]) -> list[list[Stop]]:

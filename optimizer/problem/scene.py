@@ -160,6 +160,7 @@ class Attachment:
     is_hull: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if isinstance(self.shape, HalfSpace):
             raise InvalidProblem("shape", "A half-space cannot be carried: use a box.")
         if isinstance(self.shape, Cloud):

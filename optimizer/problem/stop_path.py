@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.declared_types import check_fields
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.scalars import check_speed
 from joulepath.optimizer.problem.targets import SampledPoses, Target, members
@@ -40,6 +41,7 @@ class StopPath:
     split: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self, "path.")
         check_speed("path.speed", self.speed)
 
     def check_ends(self, target: Target) -> None:

@@ -14,6 +14,7 @@ from joulepath.models.robot import Limits
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.declared_types import check_fields
 from joulepath.optimizer.problem.line import Line
 from joulepath.optimizer.problem.scene import Scene
 from joulepath.optimizer.problem.stop_path import STRAIGHT, StopPath
@@ -53,6 +54,9 @@ class Stop:
         obstacles_ignored: names of obstacles ignored at the stop, on its lines and its path.
         via: whether the arm passes through the target without a rest, within the limits of all
             stops of this motion.
+
+    Raises:
+        InvalidProblem: a field has another type; names the field.
     """
 
     name: str
@@ -68,6 +72,9 @@ class Stop:
     path: StopPath | None = None
     obstacles_ignored: Sequence[str] = ()
     via: bool = False
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     @property
     def free_ends(self) -> tuple[bool, bool]:

@@ -12,6 +12,7 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.declared_types import check_fields
 from joulepath.optimizer.problem.pose import Pose
 
 MOST_TARGETS = 64
@@ -33,6 +34,7 @@ class AnyOf:
     targets: tuple[Single, ...]
 
     def __post_init__(self) -> None:
+        check_fields(self)
         object.__setattr__(self, "targets", tuple(self.targets))
         if not 1 <= len(self.targets) <= MOST_TARGETS:
             raise InvalidProblem("any_of", f"any_of must hold 1 to {MOST_TARGETS} targets.")

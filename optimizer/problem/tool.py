@@ -12,6 +12,7 @@ from joulepath.models.robot import Array
 from joulepath.models.tools.registry import tool_figures, tool_names
 from joulepath.optimizer.exceptions import UnknownTool
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.declared_types import check_type
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.scene import Attachment, Mesh, capsule_between
 
@@ -61,7 +62,6 @@ def _about(mass: float, offset: Array) -> Array:
     return np.asarray(mass * (offset @ offset * np.eye(3) - np.outer(offset, offset)))
 
 
-@cache
 def load_tool(name: str) -> Tool:
     """Load a gripper of the library.
 
@@ -73,9 +73,17 @@ def load_tool(name: str) -> Tool:
 
     Raises:
         UnknownTool: no tool has this name.
+        InvalidProblem: the name is no text.
     """
+    check_type("name", name, str)
     if name not in tool_names():
         raise UnknownTool(list(tool_names()))
+    return _tool(name)
+
+
+@cache
+def _tool(name: str) -> Tool:
+    """The tool of a name in the library."""
     figures = tool_figures(name)
     value = {key: figure["value"] for key, figure in figures.items() if key != "title"}
     ixx, ixy, ixz, iyy, iyz, izz = value["inertia"]

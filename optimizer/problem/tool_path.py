@@ -100,8 +100,8 @@ class ToolPath:
     section: Section | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "via", tuple(self.via))
         check_fields(self, "path.")
+        object.__setattr__(self, "via", tuple(self.via))
         most = MOST_POINTS[self.shape]
         if len(self.via) > most:
             raise InvalidProblem(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import NoneType
 from typing import Literal
 
 from joulepath.models.robot import Array, TorqueSide
@@ -11,7 +12,8 @@ from joulepath.optimizer.identify.logs.columns import ColumnMap
 from joulepath.optimizer.identify.logs.file_rows import FILE
 from joulepath.optimizer.identify.logs.log import EffortMeaning
 from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.declared_types import check_fields
+from joulepath.optimizer.problem.declared_types import check_fields, check_type
+from joulepath.optimizer.problem.scalars import check_number
 
 
 @dataclass(frozen=True)
@@ -19,7 +21,7 @@ class LogOptions:
     """Information about a log beyond the content of its file.
 
     Raises:
-        InvalidProblem: a unit, the meaning of the efforts or their side is unknown.
+        InvalidProblem: an option has another type, or an unknown choice.
     """
 
     payload: Payload | None = None
@@ -44,3 +46,5 @@ class LogOptions:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        check_type("columns", self.columns, Mapping, NoneType)
+        check_number("max_bytes", self.max_bytes, "bytes", least=1)

@@ -39,7 +39,7 @@ from joulepath.optimizer.identify.logs.moves import cut_into_moves, rests_by_com
 from joulepath.optimizer.identify.logs.speeds import speeds_of
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.arrays import frozen
-from joulepath.optimizer.problem.declared_types import checked_arguments
+from joulepath.optimizer.problem.declared_types import check_type, checked_arguments
 
 
 @dataclass(frozen=True)
@@ -122,6 +122,7 @@ def read_log(
         InvalidProblem: an option does not fit the file or the robot.
         OSError: the file cannot be read.
     """
+    check_type("source", source, str, bytes, PathLike)
     path_or_content = source if isinstance(source, bytes) else Path(source)
     return _read(path_or_content, robot, options or LogOptions())
 

@@ -17,6 +17,7 @@ HOME = np.radians([0.0, -90, 90, -90, 180, 0])
 PROBLEM = Problem(arm=ARM, start=HOME, goal=HOME + 0.1)
 ANYWHERE = Places([np.eye(4)])
 POSE = joulepath.Pose(np.eye(4))
+ATTACHMENT = joulepath.Attachment(joulepath.Sphere(0.1))
 
 
 @pytest.mark.parametrize(
@@ -28,7 +29,7 @@ POSE = joulepath.Pose(np.eye(4))
         ("pareto", [PROBLEM], {"points": "3"}, "points must be a number, not '3'"),
         ("what_if", [1, []], {}, "solution must be of type Solution, not int: give the answer"),
         ("plan_cycle", [PROBLEM], {}, "cycle must be of type Cycle, not Problem"),
-        ("place", [3, ANYWHERE], {}, "cycles must be a sequence, not int"),
+        ("place", [3, ANYWHERE], {}, "cycles must be a list of WeightedCycle, not int"),
         ("place", [[3], ANYWHERE], {}, "cycles.0 must be of type WeightedCycle, not int"),
         ("evaluate", [ROBOT, 3], {}, "arm must be of type Arm, not Robot: give Arm(robot="),
         ("evaluate", [ARM, HOME], {}, "motion must be of type "),
@@ -38,6 +39,11 @@ POSE = joulepath.Pose(np.eye(4))
         ("export", [3, "csv"], {}, "motion must be of type Solution or "),
         ("identify", [ROBOT, [3]], {}, "logs.0 must be of type Log, not int: give read_log("),
         ("read_log", ["log.csv", "ur5e"], {}, "robot must be of type Robot, not str: give load_"),
+        ("even_payload", [None, ATTACHMENT], {}, "mass must be a number, not None"),
+        ("even_payload", [1.0, 2], {}, "shape must be of type Attachment, not int: give load_"),
+        ("load_tool", [["suction_cup"]], {}, "name must be of type str, not list"),
+        ("read_log", [3, ROBOT], {}, "source must be of type str or bytes or PathLike, not int"),
+        ("Client", [None], {}, "url must be of type str, not NoneType"),
         ("load_robot", [3], {}, "robot must be of type str or PathLike, not int"),
         ("load_robot", ["ur5e"], {"figures": 3}, "figures must be of type dict or str or "),
     ],
