@@ -14,7 +14,7 @@ from joulepath.models.robot import Array
 from joulepath.models.shape_sizes import SIZES
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import frozen, placement
-from joulepath.optimizer.problem.declared_types import check_fields
+from joulepath.optimizer.problem.declared_types import check_fields, check_type
 
 Mount = Literal["floor", "wall", "ceiling"]
 Coordinate = Literal["x", "y", "z", "yaw"]
@@ -154,13 +154,16 @@ class Moved:
         moves: "base", or a group of stops and obstacles.
 
     Raises:
-        InvalidProblem: a group has a mount.
+        InvalidProblem: a group has a mount, or a field another type.
     """
 
     region: Region | Places
     moves: Literal["base"] | Group = "base"
 
     def __post_init__(self) -> None:
+        check_fields(self)
+        if not (isinstance(self.moves, str) and self.moves == "base"):
+            check_type("moves", self.moves, Group)
         if (
             isinstance(self.moves, Group)
             and isinstance(self.region, Region)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from types import NoneType
 from typing import overload
 
 import numpy as np
@@ -19,7 +20,7 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.declared_types import checked_arguments
+from joulepath.optimizer.problem.declared_types import check_type, checked_arguments
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scalars import check_choice, check_number
 from joulepath.optimizer.progress import Steps, TellSteps, no_listener
@@ -117,15 +118,18 @@ def replay(
         savings; for a cycle, one replay per move.
 
     Raises:
-        InvalidProblem: the motion takes too many steps, or `problem` is missing.
+        InvalidProblem: the motion takes too many steps, `problem` is missing, or an argument is
+            malformed.
         NotCertified: the solution does not belong to the arm of the problem.
         DeadlineExceeded: the deadline passed first.
     """
     check_number("step", step, "seconds", positive=True)
-    for control in controls:
-        check_choice("controls", control, ControlName)
-    for quantity in perturb or {}:
+    if not controls:
+        raise InvalidProblem("controls", "controls must name a controller.")
+    check_type("perturb", perturb, Mapping, NoneType)
+    for quantity, change in (perturb or {}).items():
         check_choice("perturb", quantity, Quantity)
+        check_number(f"perturb.{quantity}", change, most=1.0)
     try:
         with (
             watch(Deadline.after(deadline, clock)),

@@ -9,12 +9,27 @@ import numpy as np
 import pytest
 
 import joulepath
-from joulepath import Arm, InvalidProblem, Places, Problem, UnknownRobot, load_robot
+from joulepath import (
+    Arm,
+    Cycle,
+    InvalidProblem,
+    Places,
+    PlannedMotion,
+    Problem,
+    Spline,
+    Stop,
+    UnknownRobot,
+    load_robot,
+)
+from joulepath.optimizer.replay.reference import course_of
 
 ROBOT = load_robot("ur5e")
 ARM = Arm(robot=ROBOT)
 HOME = np.radians([0.0, -90, 90, -90, 180, 0])
 PROBLEM = Problem(arm=ARM, start=HOME, goal=HOME + 0.1)
+CYCLE = Cycle(arm=ARM, start=HOME, stops=[Stop(name="a", target=HOME + 0.1)])
+LINE = Spline(1, np.array([0.0, 0.0, 1.0, 1.0]), np.array([HOME, HOME + 0.1]))
+PLANNED = PlannedMotion(ARM, course_of(LINE), 1.0, 1.0, 1.0)
 ANYWHERE = Places([np.eye(4)])
 POSE = joulepath.Pose(np.eye(4))
 ATTACHMENT = joulepath.Attachment(joulepath.Sphere(0.1))
@@ -36,6 +51,10 @@ ATTACHMENT = joulepath.Attachment(joulepath.Sphere(0.1))
         ("inverse_kinematics", [ARM, HOME], {}, "pose must be of type Pose or "),
         ("inverse_kinematics", [ARM, POSE], {"deadline": "1"}, "deadline must be a number"),
         ("replay", [3], {"problem": PROBLEM}, "motion must be of type Solution or "),
+        ("replay", [PLANNED], {"controls": []}, "controls must name a controller"),
+        ("replay", [PLANNED], {"perturb": 0.1}, "perturb must be of type Mapping, not float"),
+        ("replay", [PLANNED], {"perturb": {"payload": "1"}}, "perturb.payload must be a number"),
+        ("place", [CYCLE, ANYWHERE], {"moves": "x"}, "moves must be of type Group, not str"),
         ("export", [3, "csv"], {}, "motion must be of type Solution or "),
         ("identify", [ROBOT, [3]], {}, "logs.0 must be of type Log, not int: give read_log("),
         ("read_log", ["log.csv", "ur5e"], {}, "robot must be of type Robot, not str: give load_"),
