@@ -8,7 +8,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.planner.joint_path import path_length, path_lengths
-from joulepath.optimizer.collision.planner.path_planner import PLANNER, USUAL_EFFORT, Effort
+from joulepath.optimizer.collision.planner.path_planner import PLANNER, Effort
 from joulepath.optimizer.collision.planner.planning_result import PlannedPaths, PlanningEnd
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import Spline
@@ -46,6 +46,12 @@ class PlannedPathSettings:
     ample_time: float = 3.0
     """Time left [s] from which `effort_of_sole` is used: planning takes up to 0.3 s, and each of
     the solves in narrow spaces as long. With 0.8 s, half of the cages had no motion in time."""
+
+    effort_of_first: Effort = field(
+        default_factory=lambda: Effort(paths=16, more_states=36_000, easy=20_000)
+    )
+    """Effort until a motion is known. Where the first path is hard to find, it is often a long
+    detour: in one cage, a motion along it needed 1.56 times as much energy."""
 
     effort_of_another: Effort = field(default_factory=lambda: Effort(more_states=1_000))
     """Effort once a motion is known: a second path of another candidate seldom leads to a better
@@ -90,7 +96,7 @@ def plan(method: Method) -> PlannedPaths:
         ample = deadline.left >= settings.ample_time
         effort = settings.effort_of_sole if ample else settings.effort_in_haste
     else:
-        effort = USUAL_EFFORT if unknown else settings.effort_of_another
+        effort = settings.effort_of_first if unknown else settings.effort_of_another
     return surroundings.planned_paths(
         method.q_start,
         method.q_goal,
