@@ -23,16 +23,18 @@ from joulepath.optimizer.solve.methods import method_of
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 
 
-def slides(prepared: PreparedProblem, candidate: Candidate) -> bool:
-    """Whether an end of a candidate may slide along a self-motion.
+def may_slide(prepared: PreparedProblem) -> bool:
+    """Whether ends at a pose may slide along self-motions.
 
     The arm must have one joint more than a pose fixes, and the method free control points.
     """
-    able = (
-        prepared.arm.robot.nq == POSE_FREEDOMS + 1
-        and method_of(prepared.problem).free_control_points
-    )
-    return able and (
+    is_redundant = prepared.arm.robot.nq == POSE_FREEDOMS + 1
+    return is_redundant and method_of(prepared.problem).free_control_points
+
+
+def slides(prepared: PreparedProblem, candidate: Candidate) -> bool:
+    """Whether an end of a candidate may slide along a self-motion."""
+    return may_slide(prepared) and (
         candidate.start.self_motion is not None or candidate.goal.self_motion is not None
     )
 

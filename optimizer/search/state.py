@@ -91,6 +91,8 @@ class SearchState:
     """Whether least work between sliding ends has been sought."""
     other_durations_solved: bool = False
     """Whether motions of least work of other durations have been compared."""
+    best_ends_searched: bool = False
+    """Whether least work between the ends of the best motion has been sought."""
     seeks_baselines: bool = False
     """Whether baselines along planned paths are sought where the usual ones break a limit."""
     baselines: list[Baseline] = field(default_factory=list)
