@@ -46,7 +46,9 @@ class _Obstacle(Request):
         "table",
     )
     margin: float = described(
-        "Required clearance between the arm and this obstacle; 0 allows contact.",
+        "Required clearance between the arm, its tool and its payload and this obstacle. Where the "
+        "arm rests, 0.2 mm more is required: draw a surface on which a part lies 1 mm lower, and "
+        "give it the margin 0.",
         "m",
         0.02,
         default=SCENE_RANGES.default_margin,

@@ -105,8 +105,9 @@ function Close({ shown }: { shown: Answered }) {
         </Button>
       }
     >
-      {clearance.pair.join(" and ")} pass at a distance of {figure(distance * 1000, 2)} mm,{" "}
-      {figure(clearance.min_clearance * 1000, 2)} mm more than required.
+      {clearance.pair.join(" and ")} pass at a distance of {figure(distance * 1000, 2)} mm. Proven:
+      at least {figure(clearance.min_clearance * 1000, 2)} mm more than the margin, at every
+      instant.
     </Note>
   );
 }

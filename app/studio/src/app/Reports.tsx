@@ -1,5 +1,6 @@
 import { useEffect, useState } from "preact/hooks";
 import { Button } from "../ui/Button";
+import { plain } from "../store/facts";
 import { fileOf, reports, type Report } from "../store/report";
 
 const TICK = 1000; // [ms]
@@ -31,7 +32,7 @@ function Card({ report }: { report: Report }) {
       <p role={state === "failed" ? "alert" : "status"}>
         {state === "writing" && `The report on ${title} is being written.`}
         {state === "saved" && `${name} is saved, with the request and the answer attached.`}
-        {state === "failed" && `The report on ${title} was not written: ${why}`}
+        {state === "failed" && `The report on ${title} was not written: ${plain(why)}`}
       </p>
       {state === "writing" && (
         <p class="row hint">

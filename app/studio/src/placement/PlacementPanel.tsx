@@ -76,8 +76,8 @@ function Found() {
       </dl>
       {answer.left_out > 0 && (
         <p class="warning-text">
-          {answer.left_out} of the {map.places.length} places of the map were not computed before
-          the deadline.
+          {answer.left_out} of the {map.places.length} places of the map were not computed within
+          the search time: raise it, or the spacing of places.
         </p>
       )}
       {answer.warnings.map((text) => (

@@ -103,6 +103,7 @@ export function PayloadFields({ pointer }: { pointer: Pointer }) {
         </div>
       )}
       <p class="hint">
+        Positions are in the flange frame.{" "}
         {even
           ? "Centre and inertia are computed from mass and size."
           : listOf(inertia).length

@@ -82,7 +82,13 @@ export function TimeField() {
       />
       {seconds && (
         <div class="field">
-          <span>{choice === "period" ? "from start to start" : "seconds"}</span>
+          <span>
+            {choice === "period"
+              ? "from start to start"
+              : kind.value === "cycle"
+                ? "cycle time"
+                : "duration"}
+          </span>
           <NumberCell label="Time" pointer={seconds} value={at(asked, seconds)} unit="s" withUnit />
         </div>
       )}
@@ -95,7 +101,10 @@ export function TimeField() {
 /** "One move every … s": it prices the wait, and changes nothing of the motion. */
 function Every() {
   return (
-    <span class="every">
+    <span
+      class="every"
+      title="Adds the energy of the wait to the costs; the motion stays the same."
+    >
       one {kind.value === "cycle" ? "cycle" : "move"} every{" "}
       <PlainNumber
         label="Time per move or cycle"
