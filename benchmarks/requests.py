@@ -120,6 +120,7 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     """Statistics of a run."""
     solved = [o for o in outcomes if o.status == 200]
     valid = [o for o in solved if not o.errors]
+    kinds = sorted({o.task.kind for o in solved})
     relative_excess = [o.relative_excess for o in outcomes if o.relative_excess is not None]
     return {
         "count": len(outcomes),
@@ -132,10 +133,10 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "errors": [f"{o.name}: {error}" for o in outcomes for error in o.errors],
         "balance_error": max((o.balance_error for o in solved), default=0.0),
         "gap": Spread.of([o.gap for o in solved]),
-        "gaps": {kind: Spread.of([o.gap for o in solved if o.task.kind == kind]) for kind in KINDS},
+        "gaps": {kind: Spread.of([o.gap for o in solved if o.task.kind == kind]) for kind in kinds},
         "widest": max(solved, key=lambda o: o.gap).name if solved else "",
         "wall": {
-            kind: Spread.of([o.wall for o in solved if o.task.kind == kind]) for kind in KINDS
+            kind: Spread.of([o.wall for o in solved if o.task.kind == kind]) for kind in kinds
         },
         "slowest": max(outcomes, key=lambda o: o.wall).name if outcomes else "",
         "candidates": Spread.of([o.candidates for o in solved]),

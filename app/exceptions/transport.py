@@ -15,7 +15,10 @@ class NotFound(ServiceError):
     status = 404
     title = "Not found"
     remedy = "Use one of the paths that `GET /openapi.json` lists."
-    detail = "This path does not exist: leave out a slash at its end. See GET /openapi.json."
+    detail = (
+        "This path does not exist: use one that GET /openapi.json lists, and leave out a slash at "
+        "its end."
+    )
 
 
 class PagesNotBuilt(ServiceError):

@@ -284,10 +284,10 @@ class OptimizeRequest(MotionRequest):
     bound: RequestedBound = described(
         "Effort for `lower_bound`. `tight`: the candidates whose bound is below the energy of the "
         "answer get a second, greater one, which takes the copper loss of holding against gravity "
-        "into account. It takes about a second per candidate, lowest bound first, and ends before "
-        "the `deadline`. For the objective `electrical`. The bound of a free orientation gets more "
-        "effort, too. For the objective `mechanical`, candidates that differ by full turns of the "
-        "outer joints are all solved, unless their bounds rule them out.",
+        "into account. It takes some tenths of a second per candidate, lowest bound first, and "
+        "ends before the `deadline`. For the objective `electrical`. The bound of a free "
+        "orientation gets more effort, too. For the objective `mechanical`, candidates that differ "
+        "by full turns of the outer joints are all solved, unless their bounds rule them out.",
         None,
         "normal",
         default="normal",

@@ -11,6 +11,7 @@ import pytest
 
 from benchmarks.checks import beats, errors_found, refusal_errors
 from benchmarks.motion import SplineMotion, replay
+from benchmarks.requests import Outcome, summary
 from benchmarks.tasks import RequestTask, request_task
 from joulepath import load_robot, optimize
 from joulepath.app.api.optimize.task import OptimizeAnswer
@@ -144,3 +145,8 @@ def test_a_refusal_is_right_only_if_the_arm_cannot_be_held(task: RequestTask) ->
     weak = replace(robot, limits=robot.limits.tightened(tau_max=robot.limits.tau_max / 1000))
     assert refusal_errors(weak, "torque-infeasible", *ends) == []
     assert len(refusal_errors(weak, "unreachable-pose", *ends)) == 1
+
+
+def test_a_summary_has_only_the_kinds_of_tasks_that_were_solved(task: RequestTask) -> None:
+    results = summary([Outcome(task, 200, wall=0.1, gap=0.05)])
+    assert list(results["gaps"]) == list(results["wall"]) == [task.kind]
