@@ -56,7 +56,9 @@ class Saved:
             found = read(cls, json.loads(Path(path).read_text(encoding="utf-8")))
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise ValueError(
-                f"{path} is not a {cls.__name__} saved by this version of joulepath: {error}"
+                f"{path} is not a {cls.__name__} written by `save` of this version of joulepath: "
+                f"{error!r}. An answer of the service or of a command is another file: read it by "
+                "json.load."
             ) from error
         assert isinstance(found, cls)
         return found
