@@ -73,16 +73,16 @@ class CycleBaseline:
 
     name: CycleBaselineName
     """`stopping`: the best cycle that rests at the stops with `via`, too; the others then rest
-    there as well. `move_by_move`: at each stop the move that needs the least energy by itself, as
-    successive calls of `POST /optimize` choose it. `controller_default`: to the nearest
-    configuration each time, by the robot's own controller with its default speed and acceleration.
-    Where `time` changes the cycle: `same_factor`, every move slowed down or sped up by one factor;
-    `fastest_then_wait`, the fastest cycle, in its own configurations, and a wait. With a free
-    order, where it is allowed: `given_order`, the best cycle in the order of `stops`. With an
-    energy storage on the bus, only `move_by_move` and `without_storage`, the best cycle on the same
+    there as well. `move_by_move`: at each stop the move of least energy by itself, as successive
+    calls of `POST /optimize` choose it. `controller_default`: to the nearest configuration each
+    time, by the robot's controller at its default speed and acceleration. Both are left out if
+    `time` forbids their durations. Where `time` changes the cycle: `same_factor`, every move scaled
+    in time by one factor; `fastest_then_wait`, the fastest cycle, in its own configurations, and a
+    wait. With a free order, where allowed: `given_order`, the best cycle in the order of `stops`.
+    With a storage on the bus, only `move_by_move` and `without_storage`, the best cycle on the same
     bus without it. In the configurations and times of the answer: `ruckig_slowed` and `straight`,
-    every move but lines and paths by the motion of this name of `POST /optimize`. `waypoints` and
-    `blended` likewise, in their own times, if fewer than two others keep every limit."""
+    all moves but lines and paths by this motion of `POST /optimize`. `waypoints` and `blended`
+    likewise, in their own times, if fewer than two others keep every limit."""
     duration: Seconds
     """Duration of this cycle."""
     electrical: Joules = field(init=False)
