@@ -243,9 +243,9 @@ def summary_of(result: dict[str, Any]) -> dict[str, str]:
             carried["why"]
             or f"{carried['mass']:.3g} kg, standard deviation {carried['mass_sd']:.2g} kg"
         )
-    shares = [f"{_place(each)} ({each['share']:.0%})" for each in result["measure"]]
+    shares = [f"{_place(each)} ({each['share']:.0%} of the variance)" for each in result["measure"]]
     if shares:
-        lines["measure next"] = f"{', '.join(shares)} of the variance. {result['advice']['do']}"
+        lines["measure next"] = f"{', '.join(shares)}. {result['advice']['do']}"
     return lines
 
 
