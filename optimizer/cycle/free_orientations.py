@@ -24,11 +24,12 @@ from joulepath.optimizer.cycle.cycle_baselines import recompared
 from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.cycle.cycle_search import CYCLE_SEARCH
 from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleSolution
-from joulepath.optimizer.cycle.errors import NoSequence
+from joulepath.optimizer.cycle.errors import CycleTooShort, NoSequence
 from joulepath.optimizer.cycle.free_turns import free_turns
-from joulepath.optimizer.cycle.known_motions import KnownMotion, knowing, known_motions
-from joulepath.optimizer.cycle.move_problem import MOVE, problem_of
+from joulepath.optimizer.cycle.known_motions import knowing, known_motions
+from joulepath.optimizer.cycle.move_problem import MOVE
 from joulepath.optimizer.cycle.neighbouring_configurations import has_free_postures, with_neighbours
+from joulepath.optimizer.cycle.successive_moves import has_successive_moves, successively_chosen
 from joulepath.optimizer.cycle.tool_turns import (
     Turns,
     evenly_from,
@@ -46,10 +47,8 @@ from joulepath.optimizer.exceptions import (
     UnreachableTargets,
 )
 from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.search.run import Run
 
 Search = Callable[[Cycle], CycleSolution]
 
@@ -92,7 +91,7 @@ def with_free_orientations(cycle: Cycle, search: Search, clock: Clock) -> CycleS
     """
     end = Deadline.after(cycle.deadline, clock)
     free = {stop.name: stop for stop in cycle.stops if any(stop.free_ends)}
-    tried, best = dict[str, list[Turns]](), None if free else search(cycle)
+    tried, best = dict[str, list[Turns]](), None if free else _at_samples(cycle, search, end, clock)
     # an optimal cycle has no samples of postures
     if best is not None and (best.status == "optimal" or not has_free_postures(cycle)):
         return best
@@ -103,10 +102,7 @@ def with_free_orientations(cycle: Cycle, search: Search, clock: Clock) -> CycleS
         except UnreachableTargets as error:
             raise _at_any_angle(error, [f"stops/{stop.entry}" for stop in free.values()]) from None
         baselines, turns = best.baselines, turns_of_solution(best, tried)
-        plain = all(
-            len(stop.places) == 1 and not isinstance(stop.target, AnyOf) for stop in cycle.stops
-        )
-        if _is_compared_once(cycle) and plain:
+        if has_successive_moves(cycle):
             time = end.within(FREE_ORIENTATIONS.share_of_successive * end.left)
             best, baselines = _with_successive_moves(cycle, best, search, time, clock)
         best = _improved(cycle, free, best, turns, search, end)
@@ -117,6 +113,34 @@ def with_free_orientations(cycle: Cycle, search: Search, clock: Clock) -> CycleS
         place for stop in cycle.stops if not isinstance(stop.target, AnyOf) for place in stop.places
     }
     return replace(best, moves=[_with_single_targets(move, places) for move in best.moves])
+
+
+def _at_samples(cycle: Cycle, search: Search, end: Deadline, clock: Clock) -> CycleSolution:
+    """The cycle of least energy over samples of free postures.
+
+    If no chain of samples is as fast as asked, the configurations of successive moves are tried.
+
+    Raises:
+        CycleTooShort: these are not as fast either.
+        JoulepathError: the errors of `search`.
+    """
+    try:
+        return search(cycle)
+    except CycleTooShort:
+        if not (has_successive_moves(cycle) and has_free_postures(cycle)):
+            raise
+        with knowing(known_motions()):
+            chosen = successively_chosen(cycle, end, clock)
+            if chosen is None:
+                raise
+            with suppress(JoulepathError):
+                left = replace(chosen, deadline=max(end.left, MOVE.least_time))
+                found = search(left)
+                # its bound holds for all postures, and for cycles of any duration
+                own_time = replace(cycle, duration_min=None, duration_max=None)
+                time = max(end.left, MOVE.least_time)
+                return _better(found, search(replace(own_time, deadline=time)))
+        raise
 
 
 def _improved(
@@ -274,49 +298,3 @@ def _with_single_targets(move: CycleMove, places: set[str]) -> CycleMove:
     }
     passes = [replace(at, target=0) if at.stop in places else at for at in move.passes]
     return replace(move, solution=replace(move.solution, **single), passes=passes)
-
-
-def successively_chosen(cycle: Cycle, end: Deadline, clock: Clock) -> Cycle | None:
-    """The cycle with the joint positions chosen by successive moves as targets.
-
-    Only for cycles in their own time and order, with moves from stop to stop alone. A cycle chooses
-    among given orientations and postures, a single move searches its own: the moves are those of
-    successive calls of `optimize`, and are kept as known motions.
-
-    Args:
-        cycle: the cycle.
-        end: deadline of all moves.
-        clock: function that returns the time [s].
-
-    Returns:
-        The cycle; None if a move has no motion in its share of the time.
-    """
-    start, stops = cycle.start, list[Stop]()
-    for k, (stop, move) in enumerate(zip(cycle.stops, cycle.moves, strict=False)):
-        if end.passed:
-            return None
-        left, share = end.left, end.left / (len(cycle.stops) - k)
-        problem = Problem(
-            arm=move.arm,
-            start=start,
-            goal=stop.target,
-            branch=stop.branch,
-            method=cycle.method,
-            windings=cycle.windings,
-            sample_period=cycle.sample_period,
-            deadline=share,
-        )
-        try:
-            found = Run(problem, (), clock).solution()
-        except JoulepathError:
-            return None
-        if k == 0:
-            cycle = replace(cycle, start=found.start.q)
-        start = found.goal.q
-        if end.left > left - share / 2:
-            # not limited by the deadline: more time would not improve the motion
-            own, motions = problem_of(cycle, move, found.start.q, start, share), known_motions()
-            motion = KnownMotion(found.trajectory.spline, found.solver.stationarity)
-            motions.keep(motions.key("finished", own, []), motion)
-        stops.append(replace(stop, target=start))
-    return replace(cycle, stops=stops)
