@@ -179,10 +179,9 @@ def print_summary(results: dict[str, Any]) -> None:
     for line in results["refused"][:20]:
         print(f"    {line}")
     print(f"energy balance, largest error {results['balance_error']:.1e} of the total")
-    gap = results["gap"]
     print(
-        f"gap                           median {gap.p50:.1%}, 90th percentile {gap.p90:.1%}, "
-        f"maximum in {results['widest']}"
+        f"gap                           median {results['gap'].p50:.1%}, "
+        f"90th percentile {results['gap'].p90:.1%}, maximum in {results['widest']}"
     )
     for kind, gap in results["gaps"].items():
         print(
