@@ -64,7 +64,10 @@ class SamplingSettings:
     whole branches: a quarter of the goals with a free rotation needed more energy than with a given
     rotation, up to twice as much."""
     path_start: SampleCounts = SampleCounts(orientations=48, turns=12, members=8)
-    """Numbers of samples of the start of a tool path."""
+    """The same for the start of a tool path."""
+    redundant_path_start: SampleCounts = SampleCounts(orientations=48, turns=8, members=16)
+    """The same for the start of a tool path of a redundant arm. With 12 turns and 8 members, four
+    motions of least energy needed 4 to 19 % more, in the same time."""
     dense: SampleCounts = SampleCounts(orientations=384, turns=192, members=16)
     """Numbers of samples of an end that collides at all coarse samples. About an axis, the
     orientations of a single pose are two degrees apart."""

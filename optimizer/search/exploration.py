@@ -11,7 +11,7 @@ from joulepath.optimizer.search.near_goals import activate_near_goals
 from joulepath.optimizer.search.outer_turns import explore_families
 from joulepath.optimizer.search.path_motions import solve_along_paths
 from joulepath.optimizer.search.sampled_ends import activate_deferred
-from joulepath.optimizer.search.seeds import activate_seeds
+from joulepath.optimizer.search.seeds import activate_on_path, activate_seeds
 from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.search.sliding_work import explore_sliding_work
 from joulepath.optimizer.search.state import SearchState
@@ -75,6 +75,8 @@ def _activate(state: SearchState) -> bool:
 
 def _activate_samples(state: SearchState, candidates: list[Candidate]) -> bool:
     """Activate some of the given candidates; false if none is deferred."""
+    if state.problem.tool_path is not None:
+        return activate_on_path(state.prepared, candidates)
     if any(slides(state.prepared, each) for each in candidates if each.sampled):
         return activate_seeds(state.prepared, candidates)
     return activate_deferred(candidates)

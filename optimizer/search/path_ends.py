@@ -14,6 +14,7 @@ from joulepath.optimizer.bounds.missed_branches import bound_of_missed_branches
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
+from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
 from joulepath.optimizer.kinematics.tool_path.course_tracing import (
     Trace,
     traces,
@@ -56,7 +57,9 @@ def path_candidates(
     course, limits = prepared.course, prepared.arm.active_limits
     assert course is not None
     if starts is None:
-        starts, _ = ends_of(prepared, "start", prepared.problem.start, SAMPLING.path_start)
+        is_redundant = prepared.arm.robot.nq > POSE_FREEDOMS
+        counts = SAMPLING.redundant_path_start if is_redundant else SAMPLING.path_start
+        starts, _ = ends_of(prepared, "start", prepared.problem.start, counts)
     found, attempts = list[Candidate](), list[PathAttempt]()
     for start, trace in zip(starts, _traces(prepared, starts), strict=True):
         choices = _choices(start, trace, prepared.problem.goal)

@@ -7,7 +7,7 @@ Samples of least lower bound are solved.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,11 +64,32 @@ def activate_deferred(
     active: Counter[tuple[str, str, int]] = Counter()
     if per_branch_pair < SAMPLES.per_branch_pair:
         active.update(_branch_pair(each) for each in candidates if not each.deferred)
-    activated = 0
-    for candidate in sorted(
+    by_bound = sorted(
         (each for each in candidates if each.deferred),
         key=lambda each: (each.lower_bound, each.shortest),
-    ):
+    )
+    return activate_first(by_bound, batch, per_branch_pair, active)
+
+
+def activate_first(
+    candidates: Iterable[Candidate],
+    batch: int = SAMPLES.batch,
+    per_branch_pair: int = SAMPLES.per_branch_pair,
+    active: Mapping[tuple[str, str, int], int] | None = None,
+) -> bool:
+    """Activate the first samples that are open, few of each pair of branches.
+
+    Args:
+        candidates: deferred candidates, the most promising first.
+        batch: largest number of samples activated.
+        per_branch_pair: largest number of active samples of one pair of branches.
+        active: numbers of samples that are active already, by their pairs of branches.
+
+    Returns:
+        Whether any sample was activated.
+    """
+    active, activated = Counter(active or {}), 0
+    for candidate in candidates:
         branch_pair = _branch_pair(candidate)
         is_open = candidate.status is CandidateStatus.UNVISITED
         if not is_open or active[branch_pair] >= per_branch_pair:

@@ -7,12 +7,13 @@ tenth too high, by nearly the same ratio for all pairs of a problem.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.dynamics.dwell import brake_power, holding_times
@@ -23,6 +24,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.sampled_ends import activate_first
 from joulepath.optimizer.solve.methods.method import above
 
 
@@ -88,6 +90,20 @@ def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -
     return True
 
 
+def activate_on_path(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> bool:
+    """Activate the deferred starts of a tool path of least estimated energy, few of each branch.
+
+    Returns:
+        Whether any candidate was deferred.
+    """
+    known = [
+        each for each in candidates if each.deferred and each.status is CandidateStatus.UNVISITED
+    ]
+    if not known:
+        return False
+    return activate_first([known[k] for k in np.argsort(estimates_on_path(prepared, known))])
+
+
 def locally_least(candidates: Sequence[Candidate], energy: Array) -> list[Candidate]:
     """Candidates of locally least energies (n,) along their self-motions, the least first."""
     is_least = _local_minima(candidates, energy)
@@ -124,9 +140,55 @@ def estimates_between(
         rough: whether a single duration and half the instants suffice.
     """
     settings = ROUGH_ESTIMATE if rough else ESTIMATE
-    best = np.full(len(q_start), np.inf)
+    quintics = partial(of_quintics, prepared, q_start, q_goal, settings=settings)
+    return _best_of_durations(prepared, quintics, q_goal, shortest, settings)
+
+
+def estimates_on_path(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> Array:
+    """Estimated objectives of motions along a tool path, shape (n,) [J].
+
+    The motions are quintics on the curves of the joints that lead the tool along the path. Straight
+    lines between the ends, and the lower bounds of free ends, say little about these motions.
+
+    Args:
+        prepared: problem of the motions.
+        candidates: candidates with known traces.
+    """
+    (at, rate, acceleration), _ = _quintic(ESTIMATE)
+    limits, lines = prepared.arm.active_limits, list[Array]()
+    for each in candidates:
+        trace = prepared.followed.known_trace(each.q_start)
+        assert trace is not None
+        curve = CubicSpline(trace.at, trace.q)
+        lines.append(np.stack([curve(at[:, 0], order) for order in range(3)]))
+    q, slope, bend = np.stack(lines, axis=1)
+    speed = np.abs(slope * rate) / limits.v_max
+    pull = np.abs(bend * rate**2 + slope * acceleration) / limits.a_max
+    shortest = np.maximum(speed, np.sqrt(pull)).max(axis=(1, 2))
+    motions = partial(_on_lines, prepared, (q, slope, bend), settings=ESTIMATE)
+    q_goal = np.array([each.q_goal for each in candidates])
+    return _best_of_durations(prepared, motions, q_goal, shortest, ESTIMATE)
+
+
+def _best_of_durations(
+    prepared: PreparedProblem,
+    objectives: Callable[..., tuple[Array, Array]],
+    q_goal: Array,
+    shortest: Array,
+    settings: EstimateSettings,
+) -> Array:
+    """Least objectives (n,) [J] over a few durations, raised where a torque is too high.
+
+    Args:
+        prepared: problem of the motions.
+        objectives: objectives and ratios of torques for the durations `durations` (n,) [s].
+        q_goal: goal configurations, shape (n, nq) [rad].
+        shortest: shortest durations, shape (n,) [s].
+        settings: settings of the estimate.
+    """
+    best = np.full(len(q_goal), np.inf)
     for durations in _durations(prepared.problem, shortest, settings.time_scales):
-        energy, torque_ratio = of_quintics(prepared, q_start, q_goal, durations, settings)
+        energy, torque_ratio = objectives(durations=durations)
         energy += np.abs(energy) * np.maximum(torque_ratio - 1, 0.0)
         best = np.minimum(best, energy + _waiting(prepared, q_goal, durations))
     return best
@@ -142,10 +204,27 @@ def of_quintics(
     """Objectives (n,) [J] of quintics from q_start to q_goal (n, nq) [rad] in durations (n,) [s],
     and their largest ratios (n,) of a torque to its limit.
     """
-    (at, rate, acceleration), weights = _quintic(settings)
-    displacement, T, count = (q_goal - q_start)[:, None], durations[:, None, None], len(durations)
+    (at, _, _), _ = _quintic(settings)
+    displacement = (q_goal - q_start)[:, None]
     q = q_start[:, None] + displacement * at
-    y = np.concatenate([q, displacement * rate / T, displacement * acceleration / T**2], axis=2)
+    slope = np.broadcast_to(displacement, q.shape)
+    return _on_lines(prepared, (q, slope, np.zeros_like(q)), durations, settings)
+
+
+def _on_lines(
+    prepared: PreparedProblem,
+    lines: tuple[Array, Array, Array],
+    durations: Array,
+    settings: EstimateSettings,
+) -> tuple[Array, Array]:
+    """The same as `of_quintics` on curves: configurations and first two derivatives (n, k, nq) by
+    the fraction, at the fractions of the quintic.
+    """
+    (_, rate, acceleration), weights = _quintic(settings)
+    (q, slope, bend), T, count = lines, durations[:, None, None], len(durations)
+    y = np.concatenate(
+        [q, slope * rate / T, (bend * rate**2 + slope * acceleration) / T**2], axis=2
+    )
     cost, tau = prepared.kernel.values(y.reshape(-1, y.shape[2]), prepared.objective_parameters)
     ratio = np.abs(tau / prepared.arm.active_limits.tau_max).max(axis=1)
     energy = durations * (cost.reshape(count, -1) @ weights)
