@@ -64,13 +64,7 @@ def mjcf(robot: Robot) -> str:
         TypeError: `robot` is no Robot.
         ValueError: a link has no mass; MuJoCo would reject the file.
     """
-    if not isinstance(robot, Robot):
-        raise TypeError(
-            f"robot must be of type Robot, not {type(robot).__name__}: give load_robot(name)."
-        )
-    for name, body in zip(robot.link_names[1:], list(robot.model.inertias)[1:], strict=True):
-        if not body.mass > 0:
-            raise ValueError(f"Link {name!r} has no mass: a simulated link needs one.")
+    _check(robot)
     root = Element("mujoco", model=robot.name)
     SubElement(root, "compiler", angle="radian", autolimits="true")
     gravity = _text(robot.gravity)
@@ -110,6 +104,17 @@ def mjcf(robot: Robot) -> str:
         SubElement(motors, "motor", name=joint, joint=joint, ctrlrange=limit)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True)
+
+
+def _check(robot: Robot) -> None:
+    """Checks that the argument is a robot and that each of its links has a mass."""
+    if not isinstance(robot, Robot):
+        raise TypeError(
+            f"robot must be of type Robot, not {type(robot).__name__}: give load_robot(name)."
+        )
+    for name, body in zip(robot.link_names[1:], list(robot.model.inertias)[1:], strict=True):
+        if not body.mass > 0:
+            raise ValueError(f"Link {name!r} has no mass: a simulated link needs one.")
 
 
 def _followers(root: Element, robot: Robot) -> None:

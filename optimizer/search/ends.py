@@ -67,7 +67,7 @@ class SamplingSettings:
     """The same for the start of a tool path."""
     redundant_path_start: SampleCounts = SampleCounts(orientations=48, turns=8, members=16)
     """The same for the start of a tool path of a redundant arm. With 12 turns and 8 members, four
-    motions of least energy needed 4 to 19 % more, in the same time."""
+    motions of least energy needed 4 to 19 % more, and took about as long to find."""
     dense: SampleCounts = SampleCounts(orientations=384, turns=192, members=16)
     """Numbers of samples of an end that collides at all coarse samples. About an axis, the
     orientations of a single pose are two degrees apart."""

@@ -67,9 +67,7 @@ def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -
     Returns:
         Whether any candidate was deferred.
     """
-    known = [
-        each for each in candidates if each.deferred and each.status is CandidateStatus.UNVISITED
-    ]
+    known = _deferred(candidates)
     if not known:
         return False
     if len(known) > SEEDS.most_estimated:
@@ -96,12 +94,17 @@ def activate_on_path(prepared: PreparedProblem, candidates: Sequence[Candidate])
     Returns:
         Whether any candidate was deferred.
     """
-    known = [
-        each for each in candidates if each.deferred and each.status is CandidateStatus.UNVISITED
-    ]
+    known = _deferred(candidates)
     if not known:
         return False
     return activate_first([known[k] for k in np.argsort(estimates_on_path(prepared, known))])
+
+
+def _deferred(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates that are deferred and were not visited yet."""
+    return [
+        each for each in candidates if each.deferred and each.status is CandidateStatus.UNVISITED
+    ]
 
 
 def locally_least(candidates: Sequence[Candidate], energy: Array) -> list[Candidate]:
