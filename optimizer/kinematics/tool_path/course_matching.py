@@ -100,9 +100,11 @@ class _Course:
         """Matches (k,) of points `asked` (k, d), from their previous places; None if the arrays
         would be too large.
 
-        Among the places within reach, the one of least deviation plus omitted length is taken.
+        Among the places within reach, the one of least deviation plus omitted length is taken. No
+        match is before the previous one: where the course turns back, a motion would otherwise be
+        matched backwards with the part that it has already followed.
         """
-        first = np.maximum(before.piece - 1, 0)
+        first = before.piece
         last = np.searchsorted(
             self.lengths, before.length + SETTINGS.look_ahead * moved + self.reach
         )
@@ -118,7 +120,7 @@ class _Course:
         share = np.clip(
             ((asked[:, None] - start) * chord).sum(axis=2)
             / np.maximum(square, SETTINGS.least_square),
-            0.0,
+            np.where(pieces == first[:, None], before.share[:, None], 0.0),
             1.0,
         )
         points = start + share[..., None] * chord

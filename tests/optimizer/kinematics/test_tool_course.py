@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -131,3 +132,20 @@ def test_all_at_once_are_those_one_by_one(seed: int, monkeypatch: pytest.MonkeyP
             for found, wanted in zip(at_once, matched(at, known, asked, 5e-4), strict=True):
                 np.testing.assert_array_equal(found, wanted)
             monkeypatch.undo()
+
+
+@pytest.mark.parametrize("given", [{"blend": 0.02}, {"shape": "curve"}], ids=["lines", "curve"])
+def test_a_path_there_and_back_is_followed(given: dict[str, Any]) -> None:
+    """A motion along a path that turns back onto itself is matched with both of its ways."""
+    tip = moved([0.0, 0.2, 0.0])
+    problem = replace(along(tcp_pose(HOME)), tool_path=ToolPath(via=[tip], **given))
+    way_there = optimize(along(tip)).energy.of("electrical")
+    assert 1.5 * way_there < optimize(problem).energy.of("electrical") < 2.05 * way_there
+
+
+def test_a_motion_that_goes_back_on_its_way_deviates() -> None:
+    """A motion that returns over 2 cm of its line and continues is 2 cm off where it returns."""
+    course = ToolCourse.of(ToolPath(), tcp_pose(HOME).T, moved([0.0, 0.2, 0.0]).T)
+    forth, back = np.linspace(0.0, 0.5, 500), np.linspace(0.5, 0.4, 100)
+    T = course.poses(np.concatenate([forth, back, np.linspace(0.4, 1.0, 600)]))
+    assert course.deviation(T)[0].max() == pytest.approx(0.02, rel=0.02)
