@@ -2,9 +2,9 @@
 
 A point of the motion is matched with the course point of least deviation. The deviation includes
 the part of the course omitted since the previous match, so a match depends on its predecessor. All
-points are matched at once from a guess of their predecessors, and again from the result until it no
-longer changes. By induction, a fixed point equals the sequential matching: the first match depends
-on no other match, and every other match depends on an unchanged one.
+points are matched at once from a guess of their predecessors, and then, in rounds, those whose
+predecessor has changed. By induction, the result equals the sequential matching: the first match
+depends on no other match, and every other match is renewed until its predecessor is final.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from joulepath.models.robot import Array
+from joulepath.models.robot import Array, Mask
+
+Indices = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -28,19 +30,21 @@ class MatchingSettings:
     least_square: float = 1e-24
     """Squared distance of two course points below which they are one [m²]."""
     rounds: int = 8
-    """Largest number of rounds in which all points are matched at once."""
-    most_numbers: int = 2_000_000
-    """Largest number of array elements of such a round."""
+    """Largest number of rounds in which many points are matched at once; the points that still
+    change are then matched one after another.
+    """
+    most_pieces: int = 100_000
+    """Largest number of course pieces that are compared with points at once."""
 
 
 SETTINGS = MatchingSettings()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Places:
     """Places on a course."""
 
-    piece: npt.NDArray[np.intp]
+    piece: Indices
     """Index of the piece, shape (k,)."""
     share: Array
     """Share of the piece, shape (k,)."""
@@ -51,15 +55,20 @@ class _Places:
     left_out: Array
     """Omitted part of the course since the previous place, shape (k,) [m]."""
 
-    def before(self, first: Array) -> _Places:
-        """Previous places: the first point (d,) of the course, then all places but the last."""
+    def at(self, k: Indices) -> _Places:
+        """The places of indices k."""
         return _Places(
-            np.append(0, self.piece[:-1]),
-            np.append(0.0, self.share[:-1]),
-            np.append(0.0, self.length[:-1]),
-            np.concatenate([first[None], self.point[:-1]]),
-            np.append(0.0, self.left_out[:-1]),
+            self.piece[k], self.share[k], self.length[k], self.point[k], self.left_out[k]
         )
+
+    def replace(self, k: Indices, others: _Places) -> Mask:
+        """Replace the places of indices k by others, in place; return the mask of those that
+        change.
+        """
+        changed: Mask = (self.piece[k] != others.piece) | (self.share[k] != others.share)
+        self.piece[k], self.share[k], self.length[k] = others.piece, others.share, others.length
+        self.point[k], self.left_out[k] = others.point, others.left_out
+        return changed
 
 
 class _Course:
@@ -80,13 +89,14 @@ class _Course:
             moved: lengths of the motion between successive points, shape (k,) [m].
 
         Returns:
-            Places on the course, shape (k,).
+            The start of the course, then the places of the points, shape (k + 1,).
         """
-        distance = np.cumsum(moved)
+        distance = np.append(0.0, np.cumsum(moved))
         length = distance * (self.lengths[-1] / max(distance[-1], SETTINGS.least_square))
         piece = np.clip(
             np.searchsorted(self.lengths, length, side="right") - 1, 0, len(self.chords) - 1
         )
+        piece[0] = 0
         share = np.clip(
             (length - self.lengths[piece])
             / np.sqrt(np.maximum(self.squares[piece], SETTINGS.least_square)),
@@ -96,23 +106,39 @@ class _Course:
         point = self.known[piece] + share[:, None] * self.chords[piece]
         return _Places(piece, share, length, point, np.zeros_like(distance))
 
-    def after(self, before: _Places, asked: Array, moved: Array) -> _Places | None:
-        """Matches (k,) of points `asked` (k, d), from their previous places; None if the arrays
-        would be too large.
+    def match(self, places: _Places, k: Indices, asked: Array, moved: Array) -> Mask:
+        """Match the points of indices k, from their previous places.
 
-        Among the places within reach, the one of least deviation plus omitted length is taken. No
-        match is before the previous one: where the course turns back, a motion would otherwise be
-        matched backwards with the part that it has already followed.
+        Args:
+            places: as of `guess`; changed in place.
+            k: indices of points, ascending.
+            asked: all points of the motion, shape (n, d).
+            moved: lengths of the motion between them, shape (n,) [m].
+
+        Returns:
+            Mask of the points (k,) whose places change.
+        """
+        before = places.at(k)
+        last = np.searchsorted(
+            self.lengths, before.length + SETTINGS.look_ahead * moved[k] + self.reach
+        )
+        last = np.clip(last, before.piece + 1, len(self.chords))
+        width = last - before.piece
+        changed = np.zeros(len(k), dtype=bool)
+        for group in _of_similar(width):
+            found = self._after(before.at(group), last[group], asked[k[group]])
+            changed[group] = places.replace(k[group] + 1, found)
+        return changed
+
+    def _after(self, before: _Places, last: Indices, asked: Array) -> _Places:
+        """Matches (k,) of points `asked` (k, d), from their previous places.
+
+        Among the places in the pieces up to `last` (k,), the one of least deviation plus omitted
+        length is taken. No match is before the previous one: where the course turns back, a motion
+        would otherwise be matched backwards with the part that it has already followed.
         """
         first = before.piece
-        last = np.searchsorted(
-            self.lengths, before.length + SETTINGS.look_ahead * moved + self.reach
-        )
-        last = np.minimum(last, len(self.chords))
-        width = int((last - first).max())
-        if width * asked.size > SETTINGS.most_numbers and len(asked) > 1:
-            return None
-        pieces = first[:, None] + np.arange(width)
+        pieces = first[:, None] + np.arange(int((last - first).max()))
         too_far = pieces >= last[:, None]
         pieces = np.minimum(pieces, len(self.chords) - 1)
         start, chord, square = self.known[pieces], self.chords[pieces], self.squares[pieces]
@@ -154,34 +180,31 @@ def matched(at: Array, known: Array, asked: Array, reach: float) -> tuple[Array,
     """
     course = _Course(known, SETTINGS.look_ahead * reach)
     moved = np.linalg.norm(np.diff(asked, axis=0, prepend=asked[:1]), axis=1)
-    found, same = course.guess(moved), 0
+    places, count = course.guess(moved), len(asked)
+    is_open = np.ones(count + 1, dtype=bool)
     for _ in range(SETTINGS.rounds):
-        again = course.after(found.before(known[0]), asked, moved)
-        if again is None:
+        k = np.flatnonzero(is_open[:count])
+        if not len(k):
             break
-        changed = (again.piece != found.piece) | (again.share != found.share)
-        found, same = again, int(changed.argmax()) + 1 if changed.any() else len(asked)
-        if same == len(asked):
-            break
-    for k in range(same, len(asked)):
-        _match_next(course, found, k, asked, moved)
+        is_open[:] = False
+        is_open[k[course.match(places, k, asked, moved)] + 1] = True
+    for each in range(count):
+        if is_open[each]:
+            is_open[each + 1] |= course.match(places, np.array([each]), asked, moved)[0]
+    found = places.at(np.arange(1, count + 1))
     best = at[found.piece] + found.share * (at[found.piece + 1] - at[found.piece])
     return best, found.left_out, float(course.lengths[-1] - found.length[-1])
 
 
-def _match_next(course: _Course, found: _Places, k: int, asked: Array, moved: Array) -> None:
-    """Sets the match of point `k` in `found`, from the one before it; in place."""
-    own = slice(max(k - 1, 0), max(k - 1, 0) + 1)
-    last = _Places(
-        found.piece[own], found.share[own], found.length[own], found.point[own], found.left_out[own]
-    )
-    if k == 0:
-        last = _Places(
-            np.zeros(1, dtype=np.intp), np.zeros(1), np.zeros(1), course.known[:1], np.zeros(1)
+def _of_similar(width: Indices) -> list[Indices]:
+    """Groups of indices whose widths (k,) differ by at most a factor of two, of limited size."""
+    order = np.argsort(width, kind="stable")
+    _, exponent = np.frexp(width[order])
+    groups = np.split(order, np.flatnonzero(np.diff(exponent)) + 1)
+    return [
+        part
+        for group in groups
+        for part in np.array_split(
+            group, 1 + len(group) * int(width[group].max()) // SETTINGS.most_pieces
         )
-    place = course.after(last, asked[k : k + 1], moved[k : k + 1])
-    assert place is not None
-    found.piece[k] = place.piece[0]
-    found.share[k] = place.share[0]
-    found.length[k] = place.length[0]
-    found.point[k], found.left_out[k] = place.point[0], place.left_out[0]
+    ]

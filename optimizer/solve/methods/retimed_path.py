@@ -122,25 +122,30 @@ class RetimedPath:
             np.clip(basis @ np.concatenate([resting, x[:-1], resting + 1.0]), 0.0, 1.0)
         )
 
-    def speed_slack(self, x: Array, z: Array, Z: Array) -> tuple[Array, Array]:
-        """Slack of the least speed at the path points.
+    def by_control_values(self, x: Array, by_points: Array) -> Array:
+        """Derivatives (m,) by the scaling's free control values.
 
         Args:
             x: the variables, shape (n,).
-            z: q and v at the path points, shape (2, k, nq) [rad, rad/s].
-            Z: derivatives of q and v by x, shape (2, k, nq, n).
+            by_points: derivatives by the control points, shape (n, nq).
+        """
+        tangent = self.path.curve(self._fractions(x), 1)
+        by_fraction = ((self._fit.T @ by_points) * tangent).sum(axis=1)
+        return np.asarray(by_fraction @ self._instants[:, self.scaling.free])
+
+    def least_speed_at_path(self, x: Array) -> tuple[Array, Array]:
+        """The least ratio of speeds at the path points, and its derivatives.
+
+        Args:
+            x: the variables, shape (n,).
 
         Returns:
-            The slack, shape (k,), and its derivatives by x, shape (k, n).
+            The ratios, shape (k,), and their derivatives by the scaling's free control values,
+            shape (k, m).
         """
-        if self.least_speed is None:
-            return np.zeros(0), np.zeros((0, len(x)))
-        basis = self._at_path
-        aim, slope = self.least_speed.aimed_at(self._at(basis, x))
-        found = self.least_speed.linearised(*z)
-        by_x = (found.by_q @ Z[0] + found.by_v @ Z[1])[:, 0]
-        by_x[:, :-1] -= self.floor * slope[:, None] * basis[:, self.scaling.free]
-        return found.value[:, 0] - self.floor * aim, by_x
+        assert self.least_speed is not None
+        aim, slope = self.least_speed.aimed_at(self._at(self._at_path, x))
+        return self.floor * aim, self.floor * slope[:, None] * self._at_path[:, self.scaling.free]
 
     def variables(self, s: Array, t: Array) -> Array:
         """Variables (n,) of a time scaling near the fractions s (k,) at times t (k,) [s]."""

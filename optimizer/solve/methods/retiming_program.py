@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
-from joulepath.models.robot import Array, Limits
+from joulepath.models.robot import Array, Limits, Mask
 from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.kinematics.path_constraints import ConstraintRatios
 from joulepath.optimizer.solve.methods.retimed_path import RetimedPath
 
 
@@ -22,7 +23,7 @@ class RetimingProgramSettings:
     max_iterations: int = 80
     """Largest number of iterations of SLSQP."""
 
-    included_slack: float = 0.75
+    included_slack: float = 0.3
     """Slack 1 - ratio² below which a constraint becomes part of the NLP: the effort of SLSQP grows
     with the number of constraints."""
 
@@ -39,19 +40,48 @@ RETIMING_PROGRAM = RetimingProgramSettings()
 
 @dataclass(frozen=True)
 class RetimingState:
-    """Cost and constraints of the NLP at one point."""
+    """Cost and constraints of the NLP at one point, and what their derivatives need."""
 
     cost: float
     """Cost [J]."""
 
-    gradient: Array
-    """Gradient of the cost, shape (n,)."""
-
     slack: Array
-    """Values of the constraints, shape (rows,); feasible if not negative."""
+    """Values of the constraints, shape (rows,); feasible if not negative: rates (3, M, nq),
+    torques (N, nq), path constraints (K, c), least speed (K or 0,), and the order of the control
+    values (m + 1,)."""
 
-    slopes: Array
-    """Gradients of the constraints, shape (rows, n)."""
+    z: Array
+    """q, v and a at the nodes, shape (3, N, nq) [rad, rad/s, rad/s²]."""
+
+    rates: Array
+    """v, a and jerk where rates are bounded, relative to their limits, shape (3, M, nq)."""
+
+    torque: Array
+    """Torques at the nodes, relative to their limits, shape (N, nq)."""
+
+    torque_by_y: Array
+    """Derivatives of `torque` by q, v and a, shape (N, nq, 3 nq)."""
+
+    cost_by_y: Array
+    """Derivatives of the cost's integrand by q, v and a, shape (N, 3 nq) [W]."""
+
+    integral: float
+    """Integral of the cost [J]."""
+
+    at_path: Array
+    """q and v at the path points, shape (2, K, nq) [rad, rad/s]."""
+
+    path: ConstraintRatios | None
+    """Path constraints at the path points; None without any."""
+
+    speed: ConstraintRatios | None
+    """Speed relative to the least one at the path points; None without a least speed."""
+
+    @property
+    def sizes(self) -> list[int]:
+        """Numbers of constraints: rates, torques, path constraints and least speed."""
+        along = (0 if each is None else each.value.size for each in (self.path, self.speed))
+        return [self.rates.size, self.torque.size, *along]
 
 
 class RetimingProgram:
@@ -69,7 +99,8 @@ class RetimingProgram:
         self._known: tuple[bytes, RetimingState] | None = None
         m = len(first) - 1
         # the control values rise from 0 to 1, so the scaling does
-        self._rising = np.eye(m + 1, m) - np.eye(m + 1, m, -1)
+        self._rising = np.eye(m + 1) - np.eye(m + 1, m + 1, -1)
+        self._rising[:, -1] = 0.0
         self._scale = 1 / max(abs(self.state(first).cost), 1e-9)
         # the NLP has the constraints that a motion came near, and the order of the control values
         self._rows = np.zeros(len(self.state(first).slack), dtype=bool)
@@ -111,13 +142,13 @@ class RetimingProgram:
         return self._scale * self.state(x).cost
 
     def _gradient(self, x: Array) -> Array:
-        return self._scale * self.state(x).gradient
+        return self._scale * self.gradient(x)
 
     def _slack(self, x: Array) -> Array:
         return self.state(x).slack[self._rows]
 
     def _slopes(self, x: Array) -> Array:
-        return self.state(x).slopes[self._rows]
+        return self.slopes(x, self._rows)
 
     def excess(self, x: Array) -> float:
         """The largest excess of a constraint over its limit, as a ratio of the limit."""
@@ -133,82 +164,131 @@ class RetimingProgram:
 
     def _state(self, x: Array) -> RetimingState:
         retiming, space, T = self.retiming, self.retiming.space, float(np.exp(x[-1]))
-        P, slopes = retiming.points(x), retiming.slopes(x)
-        count, nq, m = len(space.nodes), P.shape[1], slopes.shape[2]
-        powers = np.power(T, np.arange(4))[:, None, None]
-        z = (space.at_nodes @ P) / powers[:3]
-        # derivatives of q, v and a at the nodes by x: (N, 3 nq, n)
-        Z = self._by_variables(space.at_nodes, slopes, z, np.arange(3.0), T)
-        y = z.transpose(1, 0, 2).reshape(count, 3 * nq)
-        Y = Z.transpose(1, 0, 2, 3).reshape(count, 3 * nq, m + 1)
-        cost, tau, gradient, jacobian, _ = retiming.prepared.kernel.node(
-            y, np.zeros((count, nq)), np.zeros(count), retiming.interval.p
+        P = retiming.points(x)
+        z = _over_powers(space.at_nodes @ P, 0, T)
+        rates = _over_powers(retiming.at_rates @ P, 1, T) / self.limits.rates[:, None]
+        y = z.transpose(1, 0, 2).reshape(len(space.nodes), -1)
+        cost, tau, by_y, tau_by_y, _ = retiming.prepared.kernel.node(
+            y, np.zeros_like(z[0]), np.zeros(len(y)), retiming.interval.p
         )
-        w = space.weights
-        total = T * float(w @ cost)
-        by_x = T * np.einsum("k,ki,kin->n", w, gradient, Y)
-        by_x[-1] += total
-        rates = retiming.at_rates @ P / powers[1:]
-        R = self._by_variables(retiming.at_rates, slopes, rates, np.arange(1.0, 4.0), T)
-        limits = self.limits.rates[:, None]
+        integral = T * float(space.weights @ cost)
         torque = tau / self.limits.tau_max
-        torque_slopes = (jacobian @ Y) / self.limits.tau_max[:, None]
-        values = [rates / limits, torque.copy()]
-        slack = [1 - value.ravel() ** 2 for value in values]
-        rows = [
-            -2 * values[0][..., None] * R / limits[..., None],
-            -2 * values[1][..., None] * torque_slopes,
-        ]
-        along, along_slopes = self._path(x, P, slopes, T)
-        rising = np.diff(np.concatenate([[0.0], x[:-1], [1.0]]))
+        slack = [1 - rates.ravel() ** 2, 1 - torque.ravel() ** 2]
+        at_path, path, speed = np.zeros((2, 0, P.shape[1])), None, None
+        if retiming.prepared.path is not None or retiming.least_speed is not None:
+            at_path = _over_powers(space.at_path @ P, 0, T)
+        if retiming.prepared.path is not None:
+            path = retiming.prepared.path.linearised(*at_path)
+            slack.append((self.bounds - path.value).ravel())
+        if retiming.least_speed is not None:
+            speed = retiming.least_speed.linearised(*at_path)
+            slack.append(speed.value[:, 0] - retiming.least_speed_at_path(x)[0])
         return RetimingState(
-            cost=retiming.interval.constant + total,
-            gradient=by_x,
-            slack=np.concatenate([*slack, along, rising]),
-            slopes=np.concatenate(
-                [
-                    *(row.reshape(-1, m + 1) for row in rows),
-                    along_slopes,
-                    np.hstack([self._rising, np.zeros((m + 1, 1))]),
-                ]
-            ),
+            cost=retiming.interval.constant + integral,
+            slack=np.concatenate([*slack, np.diff(np.concatenate([[0.0], x[:-1], [1.0]]))]),
+            z=z,
+            rates=rates,
+            torque=torque,
+            # the kernel overwrites its arrays
+            torque_by_y=tau_by_y / self.limits.tau_max[:, None],
+            cost_by_y=by_y.copy(),
+            integral=integral,
+            at_path=at_path,
+            path=path,
+            speed=speed,
         )
 
-    def _path(self, x: Array, P: Array, slopes: Array, T: float) -> tuple[Array, Array]:
-        """Slack of path constraints and least speed at the path points; its derivatives by x."""
-        path, space = self.retiming.prepared.path, self.retiming.space
-        if path is None and self.retiming.least_speed is None:
-            return np.zeros(0), np.zeros((0, len(x)))
-        z = space.at_path @ P / np.array([1.0, T])[:, None, None]
-        Z = self._by_variables(space.at_path, slopes, z, np.arange(2.0), T)
-        slack, rows = self.retiming.speed_slack(x, z, Z)
-        if path is None:
-            return slack, rows
-        found = path.linearised(*z)
-        by_x = found.by_q @ Z[0] + found.by_v @ Z[1]
-        return (
-            np.concatenate([(self.bounds - found.value).ravel(), slack]),
-            np.concatenate([-by_x.reshape(-1, by_x.shape[-1]), rows]),
-        )
+    def gradient(self, x: Array) -> Array:
+        """Gradient of the cost, shape (n,) [J]."""
+        state, space, T = self.state(x), self.retiming.space, float(np.exp(x[-1]))
+        count, nq = state.torque.shape
+        by_z = T * space.weights[:, None] * state.cost_by_y.reshape(count, 3, nq).swapaxes(0, 1)
+        by_points = np.tensordot(_over_powers(space.at_nodes, 0, T), by_z, axes=((0, 1), (0, 1)))
+        by_duration = state.integral - np.arange(3) @ (by_z * state.z).sum(axis=(1, 2))
+        return np.append(self.retiming.by_control_values(x, by_points), by_duration)
 
-    @staticmethod
-    def _by_variables(
-        matrices: Array, slopes: Array, values: Array, orders: Array, T: float
+    def slopes(self, x: Array, rows: Mask) -> Array:
+        """Gradients of the constraints of the mask `rows` (rows,), shape (k, n)."""
+        state, T = self.state(x), float(np.exp(x[-1]))
+        rates, torque, path, speed, rising = np.split(rows, np.cumsum(state.sizes))
+        slopes = self.retiming.slopes(x)
+        found = [
+            self._rate_slopes(state, slopes, T, rates.reshape(state.rates.shape)),
+            self._torque_slopes(state, slopes, T, torque.reshape(state.torque.shape)),
+        ]
+        if state.path is not None:
+            found.append(-self._path_slopes(state, state.path, slopes, T, path))
+        if state.speed is not None:
+            found.append(self._path_slopes(state, state.speed, slopes, T, speed))
+            found[-1][:, :-1] -= self.retiming.least_speed_at_path(x)[1][speed]
+        return np.concatenate([*found, self._rising[rising]])
+
+    def _rate_slopes(self, state: RetimingState, slopes: Array, T: float, rows: Mask) -> Array:
+        order, point, joint = np.nonzero(rows)
+        value = state.rates[rows]
+        found = np.empty((len(value), slopes.shape[2] + 1))
+        found[:, -1] = -(order + 1) * value
+        for each in range(rows.shape[2]):
+            own = joint == each
+            scale = np.power(T, order[own] + 1) * self.limits.rates[order[own], each]
+            basis = self.retiming.at_rates[order[own], point[own]] / scale[:, None]
+            found[own, :-1] = basis @ slopes[:, each]
+        return -2 * value[:, None] * found
+
+    def _torque_slopes(self, state: RetimingState, slopes: Array, T: float, rows: Mask) -> Array:
+        (nodes,) = np.nonzero(rows.any(axis=1))
+        Z = _by_variables(self.retiming.space.at_nodes[:, nodes], slopes, state.z[:, nodes], T)
+        by_x = _products(state.torque_by_y[rows], Z, rows[nodes])
+        return -2 * state.torque[rows][:, None] * by_x
+
+    def _path_slopes(
+        self, state: RetimingState, ratios: ConstraintRatios, slopes: Array, T: float, rows: Mask
     ) -> Array:
-        """Derivatives by x of values that are linear in the control points, over powers of T.
+        rows = rows.reshape(ratios.value.shape)
+        (points,) = np.nonzero(rows.any(axis=1))
+        basis = self.retiming.space.at_path[:, points]
+        Z = _by_variables(basis, slopes, state.at_path[:, points], T)
+        return _products(np.hstack([ratios.by_q[rows], ratios.by_v[rows]]), Z, rows[points])
 
-        By the logarithm of T, a value divided by T^d has the derivative -d times itself.
 
-        Args:
-            matrices: maps from control points to values times T^d, shape (d, k, n).
-            slopes: derivatives of the control points by the control values, shape (n, nq, m).
-            values: the values, shape (d, k, nq).
-            orders: powers of T, shape (d,).
-            T: duration [s].
+def _over_powers(values: Array, first: int, T: float) -> Array:
+    """Values (d, k, n), divided by T to the powers `first`, `first` + 1, ..."""
+    return values / np.power(T, np.arange(first, first + len(values)))[:, None, None]
 
-        Returns:
-            The derivatives, shape (d, k, nq, n).
-        """
-        by_points = np.einsum("dkp,pjm->dkjm", matrices, slopes, optimize=True)
-        by_points /= np.power(T, orders)[:, None, None, None]
-        return np.concatenate([by_points, (-orders[:, None, None] * values)[..., None]], axis=3)
+
+def _by_variables(basis: Array, slopes: Array, values: Array, T: float) -> Array:
+    """Derivatives by x of q, v, a at some instants.
+
+    By the logarithm of T, a value divided by T^d has the derivative -d times itself.
+
+    Args:
+        basis: maps from control points to values times T^d, shape (d, k, n).
+        slopes: derivatives of the control points by the control values, shape (n, nq, m).
+        values: the values, shape (d, k, nq).
+        T: duration [s].
+
+    Returns:
+        The derivatives, shape (d, k, nq, m + 1).
+    """
+    found = np.empty((*values.shape, slopes.shape[2] + 1))
+    by_points = _over_powers(basis, 0, T).reshape(-1, len(slopes)) @ slopes.reshape(len(slopes), -1)
+    found[..., :-1] = by_points.reshape(*values.shape, slopes.shape[2])
+    found[..., -1] = -np.arange(len(values))[:, None, None] * values
+    return found
+
+
+def _products(gradients: Array, Z: Array, rows: Mask) -> Array:
+    """Derivatives of constraints by x, from those by q, v and a.
+
+    Args:
+        gradients: gradients of the constraints of `rows`, in their order, shape (r, d nq).
+        Z: derivatives of q, v and a at k instants by x, shape (d, k, nq, n).
+        rows: mask (k, c) of constraints at the instants.
+
+    Returns:
+        The derivatives, shape (r, n).
+    """
+    instant, _ = np.nonzero(rows)
+    orders, _, nq, count = Z.shape
+    by_x = Z[:, instant].swapaxes(0, 1).reshape(len(instant), orders * nq, count)
+    return np.asarray((gradients[:, None] @ by_x)[:, 0])
