@@ -13,7 +13,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.bodies import Indices
-from joulepath.optimizer.collision.pair_arrays import PairArrays
+from joulepath.optimizer.collision.pair_arrays import PairArrays, PairKind
 from joulepath.optimizer.native.shared_library import address, library
 
 # In the order of the C structure.
@@ -53,7 +53,7 @@ class CompiledDistances:
     """Distances of the pairs of some bodies on the links of an arm of nq joints."""
 
     def __init__(self, arrays: PairArrays, nq: int) -> None:
-        self._nq, self._bodies = nq, len(arrays.links)
+        self._arrays, self._nq, self._bodies = arrays, nq, len(arrays.links)
         sources = vars(arrays) | {"first": arrays.pairs[:, 0], "second": arrays.pairs[:, 1]}
         # An address does not keep its array alive.
         self._kept = [_plain(sources[name]) for name in _ARRAYS]
@@ -163,11 +163,20 @@ class CompiledDistances:
         self._call(library.gradients, frames, configuration, pair, normal, point, result)
         return result
 
-    def clearance_check(self, placements: Array, pairs: Indices, reserve: float) -> ClearanceCheck:
-        """A check whether all of `pairs` (p,) are at least `reserve` [m] apart; `placements`
-        (nq, 4, 4) are those of `link_frames`. The pairs are none of clouds.
+    def clearance_check(
+        self, placements: Array, pairs: Indices, levers: Array, reserve: float
+    ) -> ClearanceCheck:
+        """A check whether all of `pairs` (p,) are at least `reserve` [m] apart.
+
+        Args:
+            placements: those of `link_frames`, shape (n, 4, 4).
+            pairs: pairs of bodies that are no clouds.
+            levers: greatest changes of their distances per radian, shape (p, n) [m/rad].
+            reserve: least distance beyond the margins [m].
         """
-        return ClearanceCheck(self._shapes, self._kept, placements, pairs, reserve)
+        return ClearanceCheck(
+            self._shapes, self._kept, self._arrays, placements, pairs, levers, reserve
+        )
 
     def _call(self, function: Any, frames: Array, *arrays: Array | Indices) -> None:
         """Calls a function of as many cases as the arrays are long; the last arrays are its
@@ -177,6 +186,23 @@ class CompiledDistances:
         function(self._of, address(arguments[0]), len(arguments[1]), *map(address, arguments[1:]))
 
 
+class _Check(ctypes.Structure):
+    """The C structure `Check`."""
+
+    _fields_ = [
+        ("shapes", ctypes.c_void_p),
+        ("placements", ctypes.c_void_p),
+        ("p", ctypes.c_long),
+        ("rows", ctypes.c_long),
+        *((name, ctypes.c_void_p) for name in ("pairs", "ends", "reach", "levers", "lever_of")),
+        ("reserve", ctypes.c_double),
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("frames", "directions", "centre", "changes", "open", "last")
+        ),
+    ]
+
+
 class ClearanceCheck:
     """Checks one configuration after the other. Not for several threads at once.
 
@@ -184,35 +210,62 @@ class ClearanceCheck:
     ended. The search for a direction that separates two convex bodies begins along the last one.
 
     Attributes:
-        frames: T_base_link (nq + 1, 4, 4) [m] of all links at the last configuration.
+        frames: T_base_link (n + 1, 4, 4) [m] of all links at the last configuration.
     """
 
     def __init__(
         self,
         shapes: _Shapes,
         kept: list[Array | Indices],
+        arrays: PairArrays,
         placements: Array,
         pairs: Indices,
+        levers: Array,
         reserve: float,
     ) -> None:
-        self.frames = np.empty((shapes.frames, 4, 4))
-        self._q, last = np.empty(len(placements)), np.zeros(1, dtype=np.intp)
-        given, workspace = (_plain(placements), _plain(pairs)), np.empty((shapes.bodies, 3))
-        directions = np.zeros((len(pairs), 3))
-        self._kept = shapes, kept, given, directions, last, workspace
-        self._arguments = (
+        p, n = levers.shape
+        self.frames, self._ends = np.empty((n + 1, 4, 4)), np.empty((2, n))
+        ends = arrays.pairs[pairs]
+        reach = arrays.ball_radii[ends].sum(axis=1) + arrays.growth[pairs] + reserve
+        # no ball encloses a half-space
+        reach[arrays.kinds[pairs] == PairKind.HALF_SPACE] = np.inf
+        # the levers to fixed obstacles are those of the body alone
+        rows, lever_of = np.unique(levers, axis=0, return_inverse=True)
+        given = [_plain(each) for each in (placements, pairs, ends, reach, rows, lever_of.ravel())]
+        workspace = [
+            self.frames,
+            np.zeros((p, 3)),
+            np.empty((shapes.bodies, 3)),
+            np.empty(len(rows)),
+            np.empty(p, dtype=np.intp),
+            np.zeros(1, dtype=np.intp),
+        ]
+        # an address does not keep its array alive
+        self._kept = shapes, kept, given, workspace
+        self._check = _Check(
             ctypes.addressof(shapes),
-            *map(address, (given[0], self._q)),
-            len(pairs),
-            address(given[1]),
+            address(given[0]),
+            p,
+            len(rows),
+            *map(address, given[1:]),
             reserve,
-            *map(address, (self.frames, directions, last, workspace)),
+            *map(address, workspace),
         )
+        self._checked = np.zeros(1, dtype=np.intp)
+        self._arguments = ctypes.addressof(self._check), *map(address, self._ends)
+        self._checked_address = address(self._checked)
 
     def is_met(self, q: Array) -> bool:
-        """Whether the pairs are far enough apart at q (nq,) [rad] of the chain."""
-        self._q[:] = q
-        return bool(library.keeps_clear(*self._arguments))
+        """Whether the pairs are far enough apart at q (n,) [rad] of the chain."""
+        return self.is_met_between(q, q, 1)[0]
+
+    def is_met_between(self, q: Array, q_end: Array, count: int) -> tuple[bool, int]:
+        """Whether the pairs are far enough apart at `count` evenly spaced configurations from q
+        to q_end (n,) [rad], without the first, and how many of these were checked.
+        """
+        self._ends[0], self._ends[1] = q, q_end
+        is_met = bool(library.is_clear_between(*self._arguments, count, self._checked_address))
+        return is_met, int(self._checked[0])
 
 
 def _plain(array: Array | Indices) -> Array | Indices:

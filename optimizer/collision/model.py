@@ -80,9 +80,9 @@ class CollisionModel:
 
     def clearance_check(self, reserve: float) -> ClearanceCheck:
         """A check whether all pairs without clouds are at least `reserve` [m] apart, for one
-        configuration after the other.
+        configuration or line after the other.
         """
-        return self.geometry.clearance_check(self._placements, reserve)
+        return self.geometry.clearance_check(self._placements, self.levers_between, reserve)
 
     def signed_distances(self, q: Array, within: float = np.inf) -> tuple[Array, Array]:
         """Signed distances (n, p) [m] of every pair at q (n, nq) [rad], and their gradients (n, p,

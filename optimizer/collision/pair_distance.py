@@ -170,10 +170,12 @@ class PairGeometry:
             best = np.maximum(best, np.minimum(*lowest) - highest)
         return np.asarray(best)
 
-    def clearance_check(self, placements: Array, reserve: float) -> ClearanceCheck:
-        """A check of all pairs without clouds, see `CompiledDistances.clearance_check`."""
+    def clearance_check(self, placements: Array, levers: Array, reserve: float) -> ClearanceCheck:
+        """A check of all pairs without clouds, see `CompiledDistances.clearance_check`; `levers`
+        (p, n) are those of all pairs.
+        """
         pairs = np.flatnonzero(~self.is_cloud)
-        return self._compiled.clearance_check(placements, pairs, reserve)
+        return self._compiled.clearance_check(placements, pairs, levers[pairs], reserve)
 
     def gradients(
         self, frames: Array, configuration: Indices, pair: Indices, witness: WitnessPoints

@@ -24,7 +24,7 @@ _FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "bounds": ([_ARRAY, _LONG, _ARRAY, _LONG, _ARRAY, _DOUBLE, _LONG, *4 * [_ARRAY]], _LONG),
     "bead_bounds": ([_ARRAY, _ARRAY, _LONG, *3 * [_ARRAY]], None),
     "witness_points": ([_ARRAY, _ARRAY, _LONG, *2 * [_ARRAY], _DOUBLE, *3 * [_ARRAY]], None),
-    "keeps_clear": ([*3 * [_ARRAY], _LONG, _ARRAY, _DOUBLE, *4 * [_ARRAY]], _LONG),
+    "is_clear_between": ([*3 * [_ARRAY], _LONG, _ARRAY], _LONG),
     "segment_segments": ([_LONG, *5 * [_ARRAY]], None),
     "box_segments": ([_LONG, *5 * [_ARRAY]], None),
     "separations": ([_ARRAY, _ARRAY, _LONG, *6 * [_ARRAY]], None),

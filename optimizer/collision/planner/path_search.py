@@ -7,6 +7,7 @@ IEEE ICRA 2000, in the implementation of OMPL; OMPL's path simplifier shortens t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -77,21 +78,45 @@ class _ValidityBudget:
     them would never be freed.
     """
 
-    def __init__(self, checker: StateValidityChecker, weights: Array, deadline: Deadline) -> None:
-        self._checker, self._deadline, self._weights = checker, deadline, weights.tolist()
-        self._q = np.empty(len(weights))
+    def __init__(
+        self, checker: StateValidityChecker, weights: Array, step: float, deadline: Deadline
+    ) -> None:
+        self._checker, self._deadline, self._weights = checker, deadline, weights
+        self._step, self._joints = step, range(len(weights))
         self.checked_states, self.allowed = 0, 0
 
     def is_valid(self, state: ob.RealVectorStateType) -> bool:
         """Whether a state of OMPL is valid."""
         self.checked_states += 1
-        for joint, weight in enumerate(self._weights):
-            self._q[joint] = state[joint] / weight
-        return self._checker.is_valid(self._q)
+        return self._checker.is_valid(self._configuration(state))
+
+    def is_valid_between(self, first: ob.RealVectorStateType, last: ob.RealVectorStateType) -> bool:
+        """Whether the line between two states of OMPL, of which the first is valid, is valid."""
+        q, q_end = self._configuration(first), self._configuration(last)
+        count = max(math.ceil(float(np.linalg.norm((q_end - q) * self._weights)) / self._step), 1)
+        is_valid, checked = self._checker.is_valid_between(q, q_end, count)
+        self.checked_states += checked
+        return is_valid
+
+    def _configuration(self, state: ob.RealVectorStateType) -> Array:
+        """Joint positions (nq,) [rad] of a state of OMPL, whose joints are weighted."""
+        return np.array([state[joint] for joint in self._joints]) / self._weights
 
     def is_spent(self) -> bool:
         """Whether the search must pause."""
         return self.checked_states >= self.allowed or self._deadline.passed
+
+
+class _MotionValidator(ob.MotionValidator):  # type: ignore[misc]
+    """Checks the line between two states in one call of the C library."""
+
+    def __init__(self, information: ob.SpaceInformation, budget: _ValidityBudget) -> None:
+        super().__init__(information)
+        self._budget = budget
+
+    def checkMotion(self, first: ob.State, last: ob.State) -> bool:
+        """Whether the line between two states is valid."""
+        return self._budget.is_valid_between(first, last)
 
 
 class PathSearch:
@@ -114,7 +139,7 @@ class PathSearch:
         deadline: Deadline,
     ) -> None:
         self._weights, self._begin, self._ends = weights, begin, ends
-        self._budget = _ValidityBudget(checker, weights, deadline)
+        self._budget = _ValidityBudget(checker, weights, box.step, deadline)
         space = ob.RealVectorStateSpace(len(weights))
         bounds = ob.RealVectorBounds(len(weights))
         for joint, (low, high) in enumerate(
@@ -125,7 +150,7 @@ class PathSearch:
         space.setBounds(bounds)
         self._information = ob.SpaceInformation(space)
         self._information.setStateValidityChecker(self._budget.is_valid)
-        self._information.setStateValidityCheckingResolution(box.step / space.getMaximumExtent())
+        self._information.setMotionValidator(_MotionValidator(self._information, self._budget))
         self._information.setup()
         self._problem = ob.ProblemDefinition(self._information)
         self._space = space
@@ -199,10 +224,7 @@ class PathSearch:
             count = (
                 int(np.linalg.norm((second - first) * self._weights) / PATH_SEARCH.last_step) + 1
             )
-            if not all(
-                self._last_checker.is_valid(q)
-                for q in np.linspace(first, second, count, endpoint=False)
-            ):
+            if not self._last_checker.is_valid_between(first, second, count)[0]:
                 return False
         return True
 

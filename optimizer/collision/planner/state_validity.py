@@ -1,7 +1,7 @@
-"""State validity checks for the path planner: one configuration at a time.
+"""State validity checks for the path planner: one configuration or line at a time.
 
-`CollisionModel` computes distances at many configurations at once. A planner checks one
-configuration after the other and only needs its validity: this takes some microseconds here.
+`CollisionModel` computes distances at many configurations at once. A planner only needs the
+validity of a configuration, or of those along a line: this takes some microseconds here.
 """
 
 from __future__ import annotations
@@ -45,6 +45,18 @@ class StateValidityChecker:
             return True
         tool_axis = self._clearance.frames[-1, :3, :3] @ self._axis
         return bool(tool_axis @ self._cone.direction >= math.cos(self._cone.half_angle))
+
+    def is_valid_between(self, q: Array, q_end: Array, count: int) -> tuple[bool, int]:
+        """Whether `count` evenly spaced configurations from q to q_end (nq,) [rad], without the
+        first, are valid, and how many of these were checked.
+        """
+        if self._cone is None and not len(self._clouds):
+            positions = self._model.coupling.positions
+            return self._clearance.is_met_between(positions(q), positions(q_end), count)
+        for checked, state in enumerate(np.linspace(q_end, q, count, endpoint=False), start=1):
+            if not self.is_valid(state):
+                return False, checked
+        return True, count
 
     def _hits_cloud(self, q: Array) -> bool:
         """Whether a body is nearer to a part of a cloud than allowed, by the cloud's own tree."""

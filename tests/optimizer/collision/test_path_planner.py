@@ -167,6 +167,27 @@ def test_state_validity_agrees_with_the_distances(seed: int) -> None:
         assert (valid != collides)[clear].all()
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_line_is_valid_if_all_its_states_are(seed: int) -> None:
+    """Short lines with few states, and lines along which every pair may come near."""
+    arm, rng = arm_in_cell(LOADS[seed], cell(seed)), np.random.default_rng(seed)
+    checker = StateValidityChecker(arm, CollisionModel(arm), 0.005)
+    limits, ends = arm.active_limits, list[bool]()
+    for _ in range(400):
+        q = rng.uniform(limits.q_min, limits.q_max)
+        if not checker.is_valid(q):
+            continue
+        count = int(rng.integers(1, 12))
+        q_end = q + rng.choice([0.02, 0.3, 3.0]) * rng.uniform(-1.0, 1.0, len(q))
+        shares = np.arange(1, count + 1) / count
+        states = (1 - shares)[:, None] * q + shares[:, None] * q_end
+        is_valid, checked = checker.is_valid_between(q, q_end, count)
+        ends.append(all(map(checker.is_valid, states)))
+        assert is_valid == ends[-1]
+        assert checked == count if is_valid else checked <= count
+    assert 10 < sum(ends) < len(ends) - 10
+
+
 @pytest.mark.parametrize("name", TASKS)
 def test_planned_paths_are_collision_free(name: str) -> None:
     arm, q_start, q_goal = task(name)
