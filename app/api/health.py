@@ -86,7 +86,7 @@ class ClusterState(Response):
     response_model=ClusterState,
     responses=problem_responses(ClusterUnavailable),
 )
-async def show(cluster: ServiceCluster) -> ClusterState:
+async def show_cluster(cluster: ServiceCluster) -> ClusterState:
     """The machines of the cluster for the requests of jobs. Without a cluster, the service's own
     workers compute them."""
     if cluster is None:

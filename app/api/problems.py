@@ -34,7 +34,7 @@ _STYLE = (
     response_class=HTMLResponse,
     responses=problem_responses(NotFound),
 )
-async def explain(
+async def explain_problem(
     slug: Annotated[
         str, Path(description="Last part of the `type` of a problem.", examples=["invalid-request"])
     ],

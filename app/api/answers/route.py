@@ -59,7 +59,7 @@ def _summary(answer: Answer) -> AnswerSummary:
     response_model=StoredAnswer,
     responses=problem_responses(UnknownAnswer, StoreUnavailable),
 )
-async def show(id: AnswerId, store: ServiceStore) -> Response:
+async def show_answer(id: AnswerId, store: ServiceStore) -> Response:
     """The complete answer with this id, and its request."""
 
     def read(session: Session) -> dict[str, Any]:
@@ -77,7 +77,7 @@ async def show(id: AnswerId, store: ServiceStore) -> Response:
     response_model=AnswerSummary,
     responses=problem_responses(InvalidRequest, UnknownAnswer, NotOwner, StoreUnavailable),
 )
-async def rename(
+async def rename_answer(
     id: AnswerId, body: AnswerName, store: ServiceStore, client: ServiceClient
 ) -> AnswerSummary:
     """Names the answer; `GET /answers` searches these names."""
@@ -91,6 +91,6 @@ async def rename(
     status_code=204,
     responses=problem_responses(UnknownAnswer, AnswerInUse, NotOwner, StoreUnavailable),
 )
-async def delete(id: AnswerId, store: ServiceStore, client: ServiceClient) -> None:
+async def delete_answer(id: AnswerId, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes an answer. An answer of a study is deleted with its study only."""
     await store.write(partial(answers.delete, answer_id=id, client=client), frees=True)

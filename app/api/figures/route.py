@@ -49,7 +49,7 @@ YAML = "application/yaml"
         **problem_responses(*WORKER_PROBLEMS, TooManyFigures),
     },
 )
-async def put(
+async def put_figures(
     request: Request,
     response: Response,
     body: FiguresDocument,
@@ -97,7 +97,7 @@ async def list_figures(store: ServiceStore) -> FiguresList:
         **problem_responses(UnknownFigures, UnknownRobot, StoreUnavailable),
     },
 )
-async def show(request: Request, id: FiguresIdPath, store: ServiceStore) -> Any:
+async def show_figures(request: Request, id: FiguresIdPath, store: ServiceStore) -> Any:
     """The robot's `figures.yaml` with the identified figures in the place of its own, their
     covariance and `sd`. `Accept: application/yaml` returns a file for `load_robot(name, figures=…)`
     of the library."""
@@ -116,7 +116,7 @@ async def show(request: Request, id: FiguresIdPath, store: ServiceStore) -> Any:
     status_code=204,
     responses=problem_responses(UnknownFigures, FiguresInUse, NotOwner, StoreUnavailable),
 )
-async def delete(id: FiguresIdPath, store: ServiceStore, client: ServiceClient) -> None:
+async def delete_figures(id: FiguresIdPath, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes figures not used by a study. Stored answers with these figures stay."""
     await store.write(partial(figures.delete, id=id, client=client), frees=True)
 

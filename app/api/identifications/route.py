@@ -69,7 +69,7 @@ _STATES = {"waiting": "queued"}
         ),
     },
 )
-async def add(
+async def add_identification(
     request: Request,
     response: Response,
     body: IdentifyRequest,
@@ -112,7 +112,7 @@ async def list_identifications(
     response_model=Identification,
     responses=problem_responses(UnknownIdentification, StoreUnavailable),
 )
-async def show(id: IdentificationId, store: ServiceStore) -> IdentificationSummary:
+async def show_identification(id: IdentificationId, store: ServiceStore) -> IdentificationSummary:
     """The state of an identification and, once it is done, its result."""
     return await _shown(store, id)
 
@@ -123,7 +123,7 @@ async def show(id: IdentificationId, store: ServiceStore) -> IdentificationSumma
     response_model=Identification,
     responses=problem_responses(InvalidRequest, UnknownIdentification, NotOwner, StoreUnavailable),
 )
-async def rename(
+async def rename_identification(
     id: IdentificationId, body: NewName, store: ServiceStore, client: ServiceClient
 ) -> IdentificationSummary:
     """Gives the identification another name, or none."""
@@ -137,7 +137,7 @@ async def rename(
     status_code=204,
     responses=problem_responses(UnknownIdentification, NotOwner, StoreUnavailable),
 )
-async def delete(
+async def delete_identification(
     id: IdentificationId, jobs: ServiceJobs, store: ServiceStore, client: ServiceClient
 ) -> None:
     """Deletes an identification with its residuals, and stops it if it runs. The identified figures
@@ -152,7 +152,7 @@ async def delete(
     response_model=ResidualCurves,
     responses=problem_responses(UnknownIdentification, StoreUnavailable),
 )
-async def residuals(id: IdentificationId, store: ServiceStore) -> Response:
+async def identification_residuals(id: IdentificationId, store: ServiceStore) -> Response:
     """Measured and modelled torques and power over time, move by move. Held-out moves are predicted
     by a fit without them."""
     body = await store.read(partial(_curves, job_id=id))

@@ -27,7 +27,7 @@ _CSV = "q1,q2,q3,q4,q5,q6\n0.0,-1.57,1.57,-1.57,-1.57,0.0\n"
         **problem_responses(*WORKER_PROBLEMS, *POSE_PROBLEMS),
     },
 )
-async def solve(body: IKRequest, wanted: WantedFormat, tasks: ServiceTasks) -> Response:
+async def solve_ik(body: IKRequest, wanted: WantedFormat, tasks: ServiceTasks) -> Response:
     """All solutions within the joint ranges, with branch, distance to the limits and smallest
     singular value. A pose with infinitely many configurations (stretched wrist) has some of them,
     with the `free` joints. Every solution has its nearest or colliding pair of bodies: links, tool,
@@ -42,7 +42,7 @@ async def solve(body: IKRequest, wanted: WantedFormat, tasks: ServiceTasks) -> R
     response_model=model_of(IKPathAnswer),
     responses=problem_responses(*WORKER_PROBLEMS, OutsideLimits),
 )
-async def follow(body: IKPathRequest, tasks: ServiceTasks) -> Response:
+async def follow_ik_path(body: IKPathRequest, tasks: ServiceTasks) -> Response:
     """Follows positions or poses of the TCP from a guess, by Levenberg-Marquardt from the previous
     configuration. Points out of reach, nearly singular or beyond a joint range are listed, but
     omitted in `trajectory`, which has the form of a request of `POST /evaluate`.

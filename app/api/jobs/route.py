@@ -92,7 +92,7 @@ _OF_ONE = (UnknownJob, StoreUnavailable)
         }
     },
 )
-async def create(
+async def create_job(
     request: Request,
     response: Response,
     tasks: ServiceTasks,
@@ -135,7 +135,7 @@ async def list_jobs(page: Annotated[JobPage, Query()], store: ServiceStore) -> J
     response_model=JobDetail,
     responses=problem_responses(InvalidRequest, *_OF_ONE),
 )
-async def show(
+async def show_job(
     id: JobId, page: Annotated[RequestPage, Query()], jobs: ServiceJobs, store: ServiceStore
 ) -> JobDetail:
     """The job with its progress and a page of its requests. A completed request refers to its
@@ -151,7 +151,7 @@ async def show(
     response_model=Job,
     responses=problem_responses(InvalidRequest, *_OF_ONE, NotOwner),
 )
-async def rename(id: JobId, body: NewName, store: ServiceStore, client: ServiceClient) -> Job:
+async def rename_job(id: JobId, body: NewName, store: ServiceStore, client: ServiceClient) -> Job:
     """Gives the job another name, or none."""
     rename = partial(stored_jobs.rename, job_id=id, name=body.name, client=client)
     return Job(**await store.write(lambda session: summary(rename(session))))
@@ -163,7 +163,7 @@ async def rename(id: JobId, body: NewName, store: ServiceStore, client: ServiceC
     status_code=204,
     responses=problem_responses(*_OF_ONE, NotOwner),
 )
-async def delete(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> None:
+async def delete_job(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> None:
     """Deletes the job with its answers. Running requests are stopped."""
     await jobs.delete(id, client)
 
@@ -175,7 +175,7 @@ async def delete(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> None:
     response_model=Job,
     responses=problem_responses(*_OF_ONE, NotOwner, JobNotCancellable),
 )
-async def cancel(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
+async def cancel_job(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
     """Cancels the waiting requests and stops the running requests within a second. Existing
     answers are kept. Cancelling a cancelled job has no effect."""
     await jobs.cancel(id, client)
@@ -189,7 +189,7 @@ async def cancel(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
     response_model=Job,
     responses=problem_responses(*_OF_ONE, NotOwner, Busy),
 )
-async def retry(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
+async def retry_job(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
     """Queues the failed and cancelled requests again. Completed requests keep their answers."""
     await jobs.retry(id, client)
     return Job(**summary(await jobs.view(id)))
@@ -214,7 +214,7 @@ KnownJob = Annotated[str, Depends(_known)]
         **problem_responses(*_OF_ONE),
     },
 )
-async def events(
+async def job_events(
     job_id: KnownJob, jobs: ServiceJobs, store: ServiceStore, last: LastEventId = None
 ) -> Response:
     """Server-sent events: `state` (of the job), `request` (a request has ended), `progress` (at
@@ -244,7 +244,7 @@ async def events(
         **problem_responses(*_OF_ONE),
     },
 )
-async def results(job_id: KnownJob, store: ServiceStore, wanted: WantedFormat) -> Response:
+async def job_results(job_id: KnownJob, store: ServiceStore, wanted: WantedFormat) -> Response:
     """The ended requests in the order of their index: one line of JSON per request, with the
     complete answer under `result`. `Accept: text/csv` returns a table of their figures without the
     answers."""

@@ -68,7 +68,7 @@ _SHOWN = tuple(name for name in LogSummary.model_fields if name not in ("tags", 
         "requestBody": {"required": True, "content": {"text/csv": {"schema": {"type": "string"}}}},
     },
 )
-async def add(
+async def add_log(
     request: Request,
     response: Response,
     tasks: ServiceTasks,
@@ -121,7 +121,7 @@ async def list_logs(page: Annotated[LogPage, Query()], store: ServiceStore) -> L
     response_model=LogDetail,
     responses=problem_responses(UnknownLog, StoreUnavailable),
 )
-async def show(id: LogId, store: ServiceStore) -> LogDetail:
+async def show_log(id: LogId, store: ServiceStore) -> LogDetail:
     """A log without its samples: channels, moves, efforts, and warnings."""
     return _detail(await store.read(partial(logs.about, log_id=id)))
 
@@ -132,7 +132,9 @@ async def show(id: LogId, store: ServiceStore) -> LogDetail:
     response_model=LogDetail,
     responses=problem_responses(InvalidRequest, UnknownLog, NotOwner, StoreUnavailable),
 )
-async def rename(id: LogId, body: NewName, store: ServiceStore, client: ServiceClient) -> LogDetail:
+async def rename_log(
+    id: LogId, body: NewName, store: ServiceStore, client: ServiceClient
+) -> LogDetail:
     """Gives the log another name, or none."""
     rename = partial(logs.rename, log_id=id, name=body.name, client=client)
     return await store.write(lambda session: _detail(rename(session)))
@@ -144,7 +146,7 @@ async def rename(id: LogId, body: NewName, store: ServiceStore, client: ServiceC
     status_code=204,
     responses=problem_responses(UnknownLog, NotOwner, StoreUnavailable),
 )
-async def delete(id: LogId, store: ServiceStore, client: ServiceClient) -> None:
+async def delete_log(id: LogId, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes a log. Identifications from it stay."""
     await store.write(partial(logs.delete, log_id=id, client=client), frees=True)
 

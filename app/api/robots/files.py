@@ -43,7 +43,7 @@ Name = Annotated[str, Path(description="Name of the robot, from `GET /robots`.",
         **problem_responses(UnknownRobot, StoreUnavailable),
     },
 )
-async def urdf(name: Name, store: ServiceStore) -> Response:
+async def robot_urdf(name: Name, store: ServiceStore) -> Response:
     """The chain of joints from `base` to `flange`, with masses, inertias and limits, without
     meshes.
     """
@@ -67,7 +67,7 @@ async def urdf(name: Name, store: ServiceStore) -> Response:
         ),
     },
 )
-async def mjcf(name: Name, tasks: ServiceTasks) -> Response:
+async def robot_mjcf(name: Name, tasks: ServiceTasks) -> Response:
     """The chain of joints from `base` to `flange` with rotor inertias, friction, limits, torque
     motors and the capsules of the links, for MuJoCo. Torques in MuJoCo equal the torques of the
     answers.
@@ -95,7 +95,7 @@ async def mjcf(name: Name, tasks: ServiceTasks) -> Response:
         ),
     },
 )
-async def joint_limits(
+async def robot_joint_limits(
     name: Name, query: Annotated[JointLimitsQuery, Query()], tasks: ServiceTasks
 ) -> Response:
     """Limits on speed and acceleration with a proof: motions within them respect the torque limits
@@ -123,7 +123,7 @@ async def joint_limits(
         ),
     },
 )
-async def meshes(
+async def robot_meshes(
     request: Request, name: Name, tasks: ServiceTasks, store: ServiceStore
 ) -> Response:
     """Simplified meshes of the maker as a glTF file, with one node per link. A node has the name

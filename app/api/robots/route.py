@@ -100,7 +100,7 @@ async def list_robots(query: Annotated[RobotQuery, Query()], store: ServiceStore
         **problem_responses(*ADDING_PROBLEMS, RobotExists),
     },
 )
-async def add(
+async def add_robot(
     request: Request,
     response: Response,
     body: NewRobot,
@@ -142,7 +142,7 @@ async def show_robot(name: Name, store: ServiceStore) -> RobotDetail:
         **problem_responses(*ADDING_PROBLEMS, RobotExists, NotOwner),
     },
 )
-async def put(
+async def put_robot(
     request: Request,
     response: Response,
     name: NewName,
@@ -169,7 +169,7 @@ async def put(
         InvalidRequest, UnknownRobot, RobotExists, NotOwner, StoreUnavailable
     ),
 )
-async def rename(
+async def rename_robot(
     name: Name,
     body: Annotated[RobotTitle, Body(openapi_examples=TITLE_EXAMPLES)],
     store: ServiceStore,
@@ -186,7 +186,7 @@ async def rename(
     status_code=204,
     responses=problem_responses(UnknownRobot, RobotExists, NotOwner, StoreUnavailable),
 )
-async def delete(name: Name, store: ServiceStore, client: ServiceClient) -> None:
+async def delete_robot(name: Name, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes an added robot. Its studies and stored answers are kept."""
     await store.write(partial(robots.delete, name=name, client=client), frees=True)
 

@@ -67,7 +67,7 @@ router = APIRouter(prefix="/studies", tags=["studies"], route_class=LargeBodyRou
         ),
     },
 )
-async def create(
+async def create_study(
     request: Request,
     response: Response,
     body: StudyRequest,
@@ -112,7 +112,7 @@ async def list_studies(page: Annotated[StudyPage, Query()], store: ServiceStore)
         **problem_responses(UnknownStudy, StoreUnavailable),
     },
 )
-async def show(id: StudyId, wanted: WantedFormat, store: ServiceStore) -> Response:
+async def show_study(id: StudyId, wanted: WantedFormat, store: ServiceStore) -> Response:
     """The study with its iterations: energy, change from the previous and from the best iteration,
     and whether the threshold is met. `Accept: text/csv` returns the history as a table."""
     history = await store.read(partial(studies.history, study_id=id))
@@ -127,7 +127,7 @@ async def show(id: StudyId, wanted: WantedFormat, store: ServiceStore) -> Respon
     response_model=StudySummary,
     responses=problem_responses(InvalidRequest, UnknownStudy, NotOwner, StoreUnavailable),
 )
-async def rename(
+async def rename_study(
     id: StudyId, body: StudyName, store: ServiceStore, client: ServiceClient
 ) -> StudySummary:
     """Gives the study another name."""
@@ -141,7 +141,7 @@ async def rename(
     status_code=204,
     responses=problem_responses(UnknownStudy, NotOwner, StoreUnavailable),
 )
-async def delete(id: StudyId, store: ServiceStore, client: ServiceClient) -> None:
+async def delete_study(id: StudyId, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes the study with its iterations and their answers."""
     await store.write(partial(studies.delete, study_id=id, client=client), frees=True)
 

@@ -53,6 +53,19 @@ def is_composite(schema: dict[str, Any]) -> bool:
     return "$ref" in repr(schema)
 
 
+def test_operations_have_names_for_generated_clients(document: dict[str, Any]) -> None:
+    """Each id is unique and a name of a method, and tells what it does to what."""
+    names = [
+        (operation["operationId"], method, path)
+        for path, operations in document["paths"].items()
+        for method, operation in operations.items()
+    ]
+    assert len({name for name, _, _ in names}) == len(names)
+    assert all(re.fullmatch(r"[a-z]+(_[a-z]+)*", name) for name, _, _ in names)
+    assert ("create_job", "post", "/jobs") in names
+    assert ("show_iteration", "get", "/studies/{id}/iterations/{number}") in names
+
+
 def test_every_field_is_described(document: dict[str, Any]) -> None:
     missing = [name for name, schema in properties(document) if not schema.get("description")]
     assert missing == []

@@ -69,7 +69,7 @@ MOST_ITERATIONS = 2**31 - 1
         ),
     },
 )
-async def add(
+async def add_iteration(
     request: Request,
     response: Response,
     id: StudyId,
@@ -153,7 +153,7 @@ async def _made(step: StudyStep, tasks: ServiceTasks, cache: AnswerCache) -> stu
     response_model=IterationDetail,
     responses=problem_responses(InvalidRequest, UnknownStudy, StoreUnavailable),
 )
-async def show(
+async def show_iteration(
     id: StudyId,
     number: Annotated[
         int, Path(description="The iteration's number.", examples=[1], ge=1, le=MOST_ITERATIONS)

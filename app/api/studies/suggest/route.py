@@ -47,7 +47,7 @@ Outcome = dict[str, Any]
         StoreUnavailable,
     ),
 )
-async def suggest(
+async def suggest_iteration(
     request: Request,
     id: StudyId,
     query: Annotated[SuggestQuery, Query()],
