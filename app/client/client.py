@@ -99,12 +99,12 @@ class Client:
         """Find a motion that tells an arm's parameters apart: `POST /excitation`."""
         return self._post("/excitation", request, fields)
 
-    def export(self, format: str, answer: Mapping[str, Any] | str, **options: Any) -> bytes:
+    def export(self, answer: Mapping[str, Any] | str, format: str, **options: Any) -> bytes:
         """Write a motion as a file for a controller: `POST /export/{format}`.
 
         Args:
-            format: name of the format.
             answer: an answer, or its id.
+            format: name of the format.
             options: further fields, such as `speed_scale`.
 
         Returns:

@@ -177,7 +177,7 @@ class RemotePlanner:
         try:
             answer = self._client.optimize(body)
             options = {"message": "trajectory", "encoding": "json", "prefix": self._prefix}
-            file = self._client.export("ros2", answer, ros2=options)
+            file = self._client.export(answer, "ros2", ros2=options)
             done.put(Plan(answer, orjson.loads(file)["msg"]))
         except Exception as error:
             done.put(error)

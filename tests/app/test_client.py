@@ -35,7 +35,7 @@ def test_it_optimizes_as_the_service_does(service: joulepath.Client) -> None:
     parts = service.optimize(move(), goal={"q": np.array(NEAR)})
     assert whole["energy"]["electrical"]["total"] == parts["energy"]["electrical"]["total"]
     assert service.get(whole["answer"])["id"] == whole["id"]
-    assert service.export("csv", whole["id"]).startswith(b"t,q1,")
+    assert service.export(whole["id"], "csv").startswith(b"t,q1,")
 
 
 def test_it_has_the_functions_of_the_library(service: joulepath.Client) -> None:
