@@ -8,7 +8,7 @@ import { Problem } from "../src/store/client";
 import { trouble, type Answered } from "../src/store/state";
 import { tell } from "../src/store/trouble";
 import type { ApiRequest, ProblemDetails } from "../src/store/types";
-import { asShown, atMost, figure, parseNumber, shown, typedValue } from "../src/store/units";
+import { asShown, atMost, ends, figure, parseNumber, shown, typedValue } from "../src/store/units";
 import { MOVE } from "./cells";
 
 it("numbers are read as people type them", () => {
@@ -27,6 +27,14 @@ it("numbers are read as people type them", () => {
     "456.7",
     "",
   ]);
+});
+
+it("intervals are rounded outwards", () => {
+  expect([
+    ends({ p5: 610.6, p95: 989.4 }),
+    ends({ p5: 55.46, p95: 59.61 }),
+    ends({ p5: -1.234, p95: 0 }),
+  ]).toEqual(["610 to 990", "55.4 to 59.7", "−1.24 to 0"]);
 });
 
 it("bounds from above are never below", () => {

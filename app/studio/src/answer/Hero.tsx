@@ -1,6 +1,6 @@
 import { Icon } from "../ui/icons";
 import { answered, stale, type Answered } from "../store/state";
-import { atMost, figure } from "../store/units";
+import { atMost, ends, figure } from "../store/units";
 import { brokenLimit, capital, energyOf, gapOf, nounOf } from "../store/facts";
 import { Parts } from "./Parts";
 
@@ -95,7 +95,7 @@ function Interval({ shown }: { shown: Answered }) {
         <i class="best" style={{ left: place(total) }} />
       </div>
       <p class="hint" id="likely">
-        90 % interval {figure(p5, 2)} to {figure(p95, 2)} J
+        90 % interval {ends(interval)} J
       </p>
     </>
   );

@@ -8,7 +8,7 @@ import { costsFor, report, type ReportFormat } from "../store/report";
 import { fileName, save } from "../store/share";
 import { economics } from "../store/state";
 import { trying } from "../store/trouble";
-import { asShown, figure, percent } from "../store/units";
+import { asShown, ends, figure, percent } from "../store/units";
 import {
   csvOfJob,
   isOver,
@@ -221,11 +221,7 @@ function MoveRow({ row, shown }: { row: JobRow; shown: Opened }) {
       <td class="number">
         <b>{row.energy === null ? "" : figure(row.energy)}</b>
       </td>
-      <td class="number">
-        {detail?.interval
-          ? `${figure(detail.interval.p5, 2)} to ${figure(detail.interval.p95, 2)}`
-          : ""}
-      </td>
+      <td class="number">{detail?.interval ? ends(detail.interval) : ""}</td>
       <td class="number" title={detail?.rival ? baselineName(detail.rival) : undefined}>
         {detail ? figure(detail.rivalEnergy) : ""}
       </td>

@@ -8,7 +8,7 @@ import { robotName } from "../store/request";
 import { robotOf } from "../store/service";
 import { request } from "../store/state";
 import { tell } from "../store/trouble";
-import { figure } from "../store/units";
+import { ends, figure } from "../store/units";
 import { evaluated, type Evaluated, type Evaluation, type LogDetail } from "./model";
 
 /** A log: what is odd in it, and the joules of each move, measured and predicted. */
@@ -99,7 +99,7 @@ function Measured({ found: { segments, cycles, total } }: { found: Evaluation })
       ...(electrical ? [drawn] : []),
       ...(efforts ? [worked] : []),
       predicted,
-      interval ? `${figure(interval.p5, 2)} to ${figure(interval.p95, 2)}` : "",
+      interval ? ends(interval) : "",
       part.difference === null ? "–" : signed(part.difference),
     ];
   };

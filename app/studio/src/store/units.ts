@@ -25,8 +25,20 @@ export function figure(value: number | null | undefined, digits = 3): string {
   const size = Math.abs(value);
   if (size === 0) return "0";
   if (size < 1e-4) return value.toExponential(1).replace("e-", " · 10⁻").replace(/\d+$/, raised);
-  const places = Math.max(0, Math.min(6, digits - 1 - Math.floor(Math.log10(size))));
-  return grouped(value.toFixed(places));
+  return grouped(value.toFixed(placesOf(value, digits)));
+}
+
+/** The places after the point of so many significant digits. */
+const placesOf = (value: number, digits: number) =>
+  Math.max(0, Math.min(6, digits - 1 - Math.floor(Math.log10(Math.abs(value)))));
+
+/** The ends of an interval, rounded outwards as in the reports. */
+export function ends({ p5, p95 }: { p5: number; p95: number }): string {
+  const outwards = (value: number, round: (scaled: number) => number) => {
+    const scale = 10 ** placesOf(value || 1, 3);
+    return figure(round(value * scale) / scale);
+  };
+  return `${outwards(p5, Math.floor)} to ${outwards(p95, Math.ceil)}`;
 }
 
 const raised = (digits: string) => [...digits].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(digit)]).join("");
