@@ -28,10 +28,6 @@ from joulepath import (
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
-from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
-from joulepath.optimizer.solve.methods.retiming_program import RetimingProgram
 from tests.optimizer.moves import AMPLE, ROBOT, limits, tcp_pose
 from tests.optimizer.tool_paths import ARM, HOME, along, moved, poses_of
 from tests.refusals import refusal_of
@@ -207,26 +203,6 @@ def test_a_least_speed_that_no_motion_keeps_says_so() -> None:
         optimize(cornered(arm=ARM, path=fast))
     (candidate,) = refusal.value.candidates
     assert "path.speed.min" in candidate.reason and "% of the path" in candidate.reason
-
-
-def test_the_gradient_of_the_least_speed_is_that_of_its_slack() -> None:
-    prepared = PreparedProblem.of(cornered())
-    path = prepared.followed.joint_path(HOME)
-    assert path is not None
-    retiming = PathRetiming(
-        prepared, path, duration_intervals(prepared, path.control_points[-1])[0]
-    )
-    x = retiming.variables(np.linspace(0.0, 1.0, 50) ** 1.5, np.linspace(0.0, 2.0, 50))
-    program = RetimingProgram(retiming, prepared.arm.active_limits, np.ones(1), x)
-    slopes, step = program.slopes(x, np.ones(program.state(x).slack.shape, dtype=bool)), 1e-6
-    differences = np.stack(
-        [
-            (program.state(x + d).slack - program.state(x - d).slack) / (2 * step)
-            for d in step * np.eye(len(x))
-        ],
-        axis=1,
-    )
-    assert np.abs(differences - slopes).max() < 1e-5 * np.abs(slopes).max()
 
 
 def test_a_given_duration_is_met() -> None:

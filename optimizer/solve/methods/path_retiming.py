@@ -1,11 +1,8 @@
-"""Retiming of a smooth path: the time scaling of least cost along a given curve in joint space.
-
-The NLP of `retiming_program` has few variables and many constraints: SLSQP (D. Kraft, "A software
-package for sequential quadratic programming", DFVLR-FB 88-28, 1988) by SciPy.
-"""
+"""Retiming of a smooth path: the time scaling of least cost along a given curve in joint space."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +19,8 @@ from joulepath.optimizer.solve.methods.limit_repair import (
 )
 from joulepath.optimizer.solve.methods.method import with_excess
 from joulepath.optimizer.solve.methods.retimed_path import RetimedPath
-from joulepath.optimizer.solve.methods.retiming_program import RETIMING_PROGRAM, RetimingProgram
+from joulepath.optimizer.solve.methods.retiming_program import RetimingProgram
+from joulepath.optimizer.solve.methods.retiming_sqp import RetimingSqp
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 
@@ -38,6 +36,10 @@ class PathRetimingSettings:
     """Initial durations tried, in multiples of the shortest duration of the quintic time
     scaling."""
 
+    feasible: float = 1e-3
+    """Largest excess of a constraint, relative to its limit, that the repair of limits between the
+    nodes can still undo."""
+
 
 PATH_RETIMING = PathRetimingSettings()
 
@@ -45,14 +47,17 @@ PATH_RETIMING = PathRetimingSettings()
 class PathRetiming(RetimedPath):
     """Time scalings of a path; arguments as of `RetimedPath`."""
 
-    def solve(self, guess: Array | None = None) -> SolveResult:
+    def solve(
+        self, guess: Array | None = None, keeps: Callable[[Spline], bool] | None = None
+    ) -> SolveResult:
         """Solve for the time scaling of least cost.
 
         Limits exceeded between the nodes are tightened. The variables where the solve ends are kept
         in `found`.
 
         Args:
-            guess: variables to start from, shape (n,); None for the quintic time scaling.
+            guess: variables to start from, shape (m + 1,); None for the quintic time scaling.
+            keeps: whether a motion keeps the tolerance of the path: otherwise the solve fails.
 
         Returns:
             The result.
@@ -67,15 +72,19 @@ class PathRetiming(RetimedPath):
         none = np.zeros(len(self.path.control_points[0]))
         iterations = 0
         for solves in range(1, PATH_RETIMING.repairs + 1):
-            program = RetimingProgram(self, limits, bounds, x)
-            x, spent = program.solve()
-            self.found = x
-            iterations += spent
-            if program.excess(x) > RETIMING_PROGRAM.feasible:
+            sqp = RetimingSqp(RetimingProgram(self, limits, bounds), x)
+            sqp.solve()
+            self.found = x = sqp.at.x
+            iterations += sqp.iterations
+            if sqp.at.violation.max() > PATH_RETIMING.feasible:
                 return SolveResult(
                     SolveStatus.FAILED, SolveReason.NO_MOTION_ALONG_PATH, iterations, solves
                 )
             spline = self.motion(x)
+            if keeps is not None and not keeps(spline):
+                return SolveResult(
+                    SolveStatus.FAILED, SolveReason.TOLERANCE_NOT_KEPT, iterations, solves
+                )
             factors = repair_factors(prepared, spline, (none, none))
             if factors is not None:
                 spline = slightly_retimed(spline, factors, self.interval.t_max)
@@ -117,7 +126,7 @@ class PathRetiming(RetimedPath):
             cost = with_excess(cost, tau, limits)
             if cost >= best:
                 break
-            best, x[-1] = cost, np.log(duration)
+            best, x[-1] = cost, duration
         return x
 
     def _cost(self, unit: Spline, duration: float) -> tuple[float, Array]:

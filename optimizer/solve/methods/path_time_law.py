@@ -20,17 +20,25 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 class PathTimeLawSettings:
     """Settings of time laws along a tool path."""
 
-    scaling_spans: int = 12
-    """Spans of the first time scaling."""
+    even_spans: float = 30.0
+    """Spans of a space of motions that are evenly spaced in time."""
 
-    scaling_spans_per_bend: int = 6
-    """Further spans per bend of the path."""
+    spans_per_path_span: float = 0.25
+    """Further spans per span of the path, where a motion follows that span."""
+
+    resolution: int = 40
+    """Instants per span at which the density of spans is evaluated."""
 
     shortest_ramp: float = 0.1
     """Smallest share of the time of a ramp of the first guess."""
 
-    longest_ramp: float = 0.5
-    """Largest share of the time of a ramp of the first guess."""
+    ramp_per_bend: float = 1.0
+    """Largest share of the time of a ramp of the first guess, divided by one more than the number
+    of bends."""
+
+    stretch: float = 1.2
+    """Duration of the first guess with bends, relative to that of its ramps and its pace: the
+    speed changes from bend to bend."""
 
     used_ramp: float = 0.8
     """Share of the length of a ramp on which the first guess reaches the least speed."""
@@ -57,19 +65,32 @@ class PathTimeLaws:
     t_max: float
     """Largest duration [s]."""
 
-    def scaling(self, finer: int) -> Basis:
-        """Space of the time scaling, with a factor on its number of spans."""
-        assert self.prepared.course is not None
-        settings, bends = PATH_TIME_LAW, self.prepared.course.shape.bends
-        spans = settings.scaling_spans + settings.scaling_spans_per_bend * bends
-        return self.space(spans * finer)
+    def space(self, path: Spline, law: tuple[Array, Array], finer: float) -> Basis:
+        """Space of motions, and of time scalings, with short spans where a law is at bends.
 
-    def space(self, spans: int) -> Basis:
-        """Space of evenly spaced knots, with further knots at the ends of a least speed's ramps."""
-        breaks = np.linspace(0.0, 1.0, spans + 1)
+        Its spans are evenly spaced in time, plus a share of the spans of the path. A least speed
+        has further knots at the ends of its ramps.
+
+        Args:
+            path: the path.
+            law: times (k,) [s] and fractions (k,) of the path.
+            finer: factor on the number of spans.
+        """
+        settings, (t, s), count = PATH_TIME_LAW, law, self.spans(path, finer)
+        knots, per_span = np.unique(path.knots), settings.spans_per_path_span
+        at = np.linspace(0.0, 1.0, settings.resolution * count)
+        passed = np.interp(np.interp(at, t / t[-1], s), knots, np.arange(len(knots)))
+        density = settings.even_spans * at + per_span * passed
+        breaks = np.interp(np.linspace(0.0, density[-1], count + 1), density, at)
         if self.prepared.least_speed is not None:
             breaks = np.unique(np.append(breaks, [self._ramp, 1 - self._ramp]).round(9))
         return Basis.of(clamped(breaks), grid_points=0)
+
+    @staticmethod
+    def spans(path: Spline, finer: float) -> int:
+        """Number of spans of a `space`."""
+        settings, of_path = PATH_TIME_LAW, len(np.unique(path.knots)) - 1
+        return round(finer * (settings.even_spans + settings.spans_per_path_span * of_path))
 
     @cached_property
     def _ramp(self) -> float:
@@ -94,15 +115,20 @@ class PathTimeLaws:
             )
         t = np.asarray(cumulative_trapezoid(pace, s, initial=0))
         at = np.linspace(0.0, 1.0, settings.checked_instants)
-        # the peak of the quintic is this pace; in less time, the ramps are shorter
-        duration = float(np.clip(quintic.PEAKS[0] * t[-1], self.t_min, self.t_max))
-        law = quintic.fraction(at)
+        assert self.prepared.course is not None
+        bends = self.prepared.course.shape.bends
+        # the peak of the quintic is this pace; with bends, and in less time, the ramps are shorter
+        most, ramp = quintic.PEAKS[0] * t[-1], np.inf
         if self.prepared.least_speed is not None:
-            duration = float(np.clip(t[-1] / (1 - self._ramp), self.t_min, self.t_max))
-            law = ramped.fraction(at, self._ramp)
-        elif duration < quintic.PEAKS[0] * t[-1]:
-            ramp = np.clip(1 - t[-1] / duration, settings.shortest_ramp, settings.longest_ramp)
-            law = ramped.fraction(at, float(ramp))
+            ramp = self._ramp
+            most = t[-1] / (1 - ramp)
+        elif bends:
+            ramp = settings.ramp_per_bend / (1 + bends)
+            most = settings.stretch * t[-1] / (1 - ramp)
+        duration = float(np.clip(most, self.t_min, self.t_max))
+        if duration < most and self.prepared.least_speed is None:
+            ramp = float(np.clip(1 - t[-1] / duration, settings.shortest_ramp, min(ramp, 0.5)))
+        law = quintic.fraction(at) if ramp == np.inf else ramped.fraction(at, ramp)
         return at * duration, np.interp(law, t / t[-1], s)
 
     def keeps_to_path(self, motion: Spline) -> bool:

@@ -41,8 +41,11 @@ class RetimedPathSettings:
     most_points: int = 72
     """Largest number of control points of the motion."""
 
-    fitted_per_point: int = 3
-    """Instants per control point at which the motion is fitted to the path."""
+    fitted_per_span: int = 3
+    """Instants per knot span at which the motion is fitted to the path."""
+
+    law_per_span: int = 16
+    """Instants per knot span at which the law of a motion is told."""
 
     rate_points: int = 4
     """Points per knot span that bound the rates."""
@@ -54,8 +57,7 @@ RETIMED_PATH = RetimedPathSettings()
 class RetimedPath:
     """The motion along a path as a function of the variables x of its time scaling.
 
-    The variables, shape (n,), are the free control values of the scaling and the logarithm of the
-    duration.
+    The variables, shape (m + 1,), are the m free control values of the scaling and the duration.
 
     Args:
         prepared: the problem.
@@ -80,7 +82,7 @@ class RetimedPath:
         count = min(len(path.control_points) + settings.further_points, settings.most_points)
         self.space = space or bspline.uniform(count)
         self.scaling = scaling or bspline.uniform(settings.scaling_points)
-        at = np.linspace(0.0, 1.0, settings.fitted_per_point * self.space.n)
+        at = instants_in_spans(np.unique(self.space.knots), settings.fitted_per_span)
         self._instants = self.scaling.matrix(at)
         self._at_path = self.scaling.matrix(self.space.path_points)
         inner, self._ends = self.space.free, np.zeros((self.space.n, 2))
@@ -93,9 +95,9 @@ class RetimedPath:
         self._ends -= self._fit @ matrix @ self._ends
 
     def motion(self, x: Array) -> Spline:
-        """The motion of the variables x (n,)."""
+        """The motion of the variables x (m + 1,)."""
         # rounding must not leave the duration's bounds
-        duration = float(np.clip(np.exp(x[-1]), self.interval.t_min, self.interval.t_max))
+        duration = float(np.clip(x[-1], self.interval.t_min, self.interval.t_max))
         return lasting(spline_of(self.space, self.points(x), duration), duration)
 
     def points(self, x: Array) -> Array:
@@ -110,6 +112,12 @@ class RetimedPath:
         return np.stack(
             [(self._fit * tangent[:, j]) @ inner for j in range(tangent.shape[1])], axis=1
         )
+
+    def law(self, x: Array) -> tuple[Array, Array]:
+        """Times (k,) [s] and fractions (k,) of the path of the variables x."""
+        breaks = np.unique(self.scaling.knots)
+        at = instants_in_spans(breaks, RETIMED_PATH.law_per_span)
+        return at * x[-1], np.maximum.accumulate(self._at(self.scaling.matrix(at), x))
 
     def _fractions(self, x: Array) -> Array:
         """s (k,) at the fitted instants."""
@@ -126,18 +134,30 @@ class RetimedPath:
         """Derivatives (m,) by the scaling's free control values.
 
         Args:
-            x: the variables, shape (n,).
+            x: the variables, shape (m + 1,).
             by_points: derivatives by the control points, shape (n, nq).
         """
         tangent = self.path.curve(self._fractions(x), 1)
         by_fraction = ((self._fit.T @ by_points) * tangent).sum(axis=1)
         return np.asarray(by_fraction @ self._instants[:, self.scaling.free])
 
+    def curvature(self, x: Array, by_points: Array) -> Array:
+        """Second derivatives (m, m) by the control values, due to the curvature of the path.
+
+        Args:
+            x: the variables, shape (m + 1,).
+            by_points: derivatives by the control points, shape (n, nq).
+        """
+        bend = self.path.curve(self._fractions(x), 2)
+        by_fraction = ((self._fit.T @ by_points) * bend).sum(axis=1)
+        inner = self._instants[:, self.scaling.free]
+        return np.asarray((inner * by_fraction[:, None]).T @ inner)
+
     def least_speed_at_path(self, x: Array) -> tuple[Array, Array]:
         """The least ratio of speeds at the path points, and its derivatives.
 
         Args:
-            x: the variables, shape (n,).
+            x: the variables, shape (m + 1,).
 
         Returns:
             The ratios, shape (k,), and their derivatives by the scaling's free control values,
@@ -148,11 +168,11 @@ class RetimedPath:
         return self.floor * aim, self.floor * slope[:, None] * self._at_path[:, self.scaling.free]
 
     def variables(self, s: Array, t: Array) -> Array:
-        """Variables (n,) of a time scaling near the fractions s (k,) at times t (k,) [s]."""
+        """Variables (m + 1,) of a time scaling near the fractions s (k,) at times t (k,) [s]."""
         x = bspline.greville(self.scaling.knots)
         control = np.linalg.solve(self.scaling.matrix(x), np.interp(x, t / t[-1], s))
         return np.append(
-            np.maximum.accumulate(np.clip(control, 0.0, 1.0))[self.scaling.free], np.log(t[-1])
+            np.maximum.accumulate(np.clip(control, 0.0, 1.0))[self.scaling.free], t[-1]
         )
 
     @cached_property

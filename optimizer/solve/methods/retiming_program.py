@@ -1,253 +1,208 @@
-"""NLP of the time scaling of least cost along a path, for SLSQP."""
+"""NLP of the time scaling of least cost along a path.
+
+The decision variables x (m + 1,) are the m free control values of the scaling and the duration T
+[s] of a `RetimedPath`. Limits on rates read |s^(d)(τ)| ≤ limit_d · T^d, as in `nonlinear_program`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
 from joulepath.models.robot import Array, Limits, Mask
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.kinematics.path_constraints import ConstraintRatios
 from joulepath.optimizer.solve.methods.retimed_path import RetimedPath
+from joulepath.optimizer.solve.methods.retiming_state import RetimingDerivatives, RetimingValues
 
-
-@dataclass(frozen=True)
-class RetimingProgramSettings:
-    """Settings of SLSQP."""
-
-    progress: float = 1e-5
-    """Relative change of the cost in a step below which SLSQP ends."""
-
-    max_iterations: int = 80
-    """Largest number of iterations of SLSQP."""
-
-    included_slack: float = 0.3
-    """Slack 1 - ratio² below which a constraint becomes part of the NLP: the effort of SLSQP grows
-    with the number of constraints."""
-
-    max_rounds: int = 6
-    """Largest number of NLPs, each with the constraints that the motion before came near."""
-
-    feasible: float = 1e-3
-    """Largest excess of a constraint, relative to its limit, that the repair of limits between the
-    nodes can still undo."""
-
-
-RETIMING_PROGRAM = RetimingProgramSettings()
-
-
-@dataclass(frozen=True)
-class RetimingState:
-    """Cost and constraints of the NLP at one point, and what their derivatives need."""
-
-    cost: float
-    """Cost [J]."""
-
-    slack: Array
-    """Values of the constraints, shape (rows,); feasible if not negative: rates (3, M, nq),
-    torques (N, nq), path constraints (K, c), least speed (K or 0,), and the order of the control
-    values (m + 1,)."""
-
-    z: Array
-    """q, v and a at the nodes, shape (3, N, nq) [rad, rad/s, rad/s²]."""
-
-    rates: Array
-    """v, a and jerk where rates are bounded, relative to their limits, shape (3, M, nq)."""
-
-    torque: Array
-    """Torques at the nodes, relative to their limits, shape (N, nq)."""
-
-    torque_by_y: Array
-    """Derivatives of `torque` by q, v and a, shape (N, nq, 3 nq)."""
-
-    cost_by_y: Array
-    """Derivatives of the cost's integrand by q, v and a, shape (N, 3 nq) [W]."""
-
-    integral: float
-    """Integral of the cost [J]."""
-
-    at_path: Array
-    """q and v at the path points, shape (2, K, nq) [rad, rad/s]."""
-
-    path: ConstraintRatios | None
-    """Path constraints at the path points; None without any."""
-
-    speed: ConstraintRatios | None
-    """Speed relative to the least one at the path points; None without a least speed."""
-
-    @property
-    def sizes(self) -> list[int]:
-        """Numbers of constraints: rates, torques, path constraints and least speed."""
-        along = (0 if each is None else each.value.size for each in (self.path, self.speed))
-        return [self.rates.size, self.torque.size, *along]
+_ORDERS = np.arange(3.0)[:, None, None]
+"""Orders of the derivatives q, v and a."""
 
 
 class RetimingProgram:
-    """The NLP of one solve, in the variables x (n,) of a `RetimedPath`.
+    """The NLP of one solve.
 
     Args:
         retiming: the path, and the map from variables to motions.
         limits: limits of the joints.
         bounds: bounds of the ratios of the path constraints, shape (c,).
-        first: variables to start from, shape (n,).
     """
 
-    def __init__(self, retiming: RetimedPath, limits: Limits, bounds: Array, first: Array) -> None:
-        self.retiming, self.limits, self.bounds, self.first = retiming, limits, bounds, first
-        self._known: tuple[bytes, RetimingState] | None = None
-        m = len(first) - 1
-        # the control values rise from 0 to 1, so the scaling does
-        self._rising = np.eye(m + 1) - np.eye(m + 1, m + 1, -1)
-        self._rising[:, -1] = 0.0
-        self._scale = 1 / max(abs(self.state(first).cost), 1e-9)
-        # the NLP has the constraints that a motion came near, and the order of the control values
-        self._rows = np.zeros(len(self.state(first).slack), dtype=bool)
-        self._rows[-(m + 1) :] = True
+    def __init__(self, retiming: RetimedPath, limits: Limits, bounds: Array) -> None:
+        self.retiming, self.limits, self.bounds = retiming, limits, bounds
+        self._path, self._least = retiming.prepared.path, retiming.least_speed
+        self._at_nodes = retiming.space.at_nodes
+        self._at_path = np.zeros((2, 0, retiming.space.n))
+        if self._path is not None or self._least is not None:
+            self._at_path = retiming.space.at_path
 
-    def solve(self) -> tuple[Array, int]:
-        """The variables where SLSQP ends, and its iterations."""
-        x, iterations = self.first, 0
-        settings = RETIMING_PROGRAM
-        for _ in range(settings.max_rounds):
-            self._rows |= self.state(x).slack < settings.included_slack
-            x, spent = self._solve(x)
-            iterations += spent
-            if self.excess(x) <= settings.feasible:
-                break
-        return x, iterations
-
-    def _solve(self, x: Array) -> tuple[Array, int]:
-        t_min, t_max = self.retiming.interval.t_min, self.retiming.interval.t_max
-        control = x[:-1]
-        found = minimize(
-            self._cost,
-            x,
-            jac=self._gradient,
-            bounds=Bounds(
-                np.append(0 * control, np.log(t_min)), np.append(0 * control + 1, np.log(t_max))
-            ),
-            constraints=NonlinearConstraint(self._slack, 0.0, np.inf, jac=self._slopes),
-            method="SLSQP",
-            options={
-                "ftol": RETIMING_PROGRAM.progress,
-                "maxiter": RETIMING_PROGRAM.max_iterations,
-            },
-        )
-        return np.asarray(found.x, dtype=float), int(found.nit)
-
-    def _cost(self, x: Array) -> float:
-        # in multiples of the first cost
-        return self._scale * self.state(x).cost
-
-    def _gradient(self, x: Array) -> Array:
-        return self._scale * self.gradient(x)
-
-    def _slack(self, x: Array) -> Array:
-        return self.state(x).slack[self._rows]
-
-    def _slopes(self, x: Array) -> Array:
-        return self.slopes(x, self._rows)
-
-    def excess(self, x: Array) -> float:
-        """The largest excess of a constraint over its limit, as a ratio of the limit."""
-        return float(-self.state(x).slack.min())
-
-    def state(self, x: Array) -> RetimingState:
-        """Cost and constraints at x, evaluated once for successive calls of SLSQP."""
-        key = x.tobytes()
-        if self._known is None or self._known[0] != key:
-            checkpoint()
-            self._known = key, self._state(x)
-        return self._known[1]
-
-    def _state(self, x: Array) -> RetimingState:
-        retiming, space, T = self.retiming, self.retiming.space, float(np.exp(x[-1]))
+    def values(self, x: Array) -> RetimingValues:
+        """Cost and constraints at x (m + 1,)."""
+        checkpoint()
+        retiming, T = self.retiming, float(x[-1])
         P = retiming.points(x)
-        z = _over_powers(space.at_nodes @ P, 0, T)
+        z = _over_powers(self._at_nodes @ P, 0, T)
+        at_path = _over_powers(self._at_path @ P, 0, T)
         rates = _over_powers(retiming.at_rates @ P, 1, T) / self.limits.rates[:, None]
-        y = z.transpose(1, 0, 2).reshape(len(space.nodes), -1)
-        cost, tau, by_y, tau_by_y, _ = retiming.prepared.kernel.node(
-            y, np.zeros_like(z[0]), np.zeros(len(y)), retiming.interval.p
-        )
-        integral = T * float(space.weights @ cost)
-        torque = tau / self.limits.tau_max
-        slack = [1 - rates.ravel() ** 2, 1 - torque.ravel() ** 2]
-        at_path, path, speed = np.zeros((2, 0, P.shape[1])), None, None
-        if retiming.prepared.path is not None or retiming.least_speed is not None:
-            at_path = _over_powers(space.at_path @ P, 0, T)
-        if retiming.prepared.path is not None:
-            path = retiming.prepared.path.linearised(*at_path)
-            slack.append((self.bounds - path.value).ravel())
-        if retiming.least_speed is not None:
-            speed = retiming.least_speed.linearised(*at_path)
-            slack.append(speed.value[:, 0] - retiming.least_speed_at_path(x)[0])
-        return RetimingState(
-            cost=retiming.interval.constant + integral,
-            slack=np.concatenate([*slack, np.diff(np.concatenate([[0.0], x[:-1], [1.0]]))]),
+        cost, tau = retiming.prepared.kernel.value(_states(z), retiming.interval.p)
+        along = least = np.zeros((at_path.shape[1], 0))
+        if self._path is not None:
+            along = self._path.ratios(*at_path) + (1 - self.bounds)
+        if self._least is not None:
+            aim, _ = retiming.least_speed_at_path(x)
+            least = 1 + aim[:, None] - self._least.speed.ratios(*at_path)
+        return RetimingValues(
+            x=x,
+            cost=retiming.interval.constant + T * float(retiming.space.weights @ cost),
             z=z,
-            rates=rates,
-            torque=torque,
-            # the kernel overwrites its arrays
-            torque_by_y=tau_by_y / self.limits.tau_max[:, None],
-            cost_by_y=by_y.copy(),
-            integral=integral,
             at_path=at_path,
+            ratios=(rates, tau / self.limits.tau_max, along, least),
+        )
+
+    def derivatives(self, at: RetimingValues, multipliers: Array) -> RetimingDerivatives:
+        """Derivatives at a point.
+
+        Args:
+            at: values at the point.
+            multipliers: multipliers (rows,) of the ratios in the Hessian, with the signs of their
+                two sides [J].
+        """
+        retiming, space, T = self.retiming, self.retiming.space, at.T
+        of_rates, of_torque, of_path, of_least = at.by_kind(multipliers)
+        cost, _, by_y, tau_by_y, bends = retiming.prepared.kernel.node(
+            _states(at.z), of_torque / self.limits.tau_max, T * space.weights, retiming.interval.p
+        )
+        torque_by_y = tau_by_y / self.limits.tau_max[:, None]
+        path, speed, least_by_values = self._along(at)
+        by_path = np.stack(
+            [
+                _weighted(of_path, path_by_z) - _weighted(of_least, speed_by_z)
+                for path_by_z, speed_by_z in zip(path[1:], speed[1:], strict=True)
+            ]
+        )
+        by_cost = _parts(T * space.weights[:, None] * by_y)
+        by_nodes = by_cost + _parts(_weighted(of_torque, torque_by_y))
+        slopes, z_by_T = retiming.slopes(at.x), -_ORDERS * at.z / T
+
+        # derivatives of the control points, and their change with the duration
+        by_points = (
+            _by_points(self._at_nodes, by_nodes, T)
+            + _by_points(self._at_path, by_path, T)
+            + _by_points(retiming.at_rates, of_rates / self.limits.rates[:, None], T, 1)
+        )
+        mixed = retiming.by_control_values(
+            at.x,
+            _by_points(self._at_nodes, (by_cost - _ORDERS * by_nodes) / T, T)
+            - _by_points(self._at_path, _ORDERS[:2] * by_path / T, T),
+        )
+        Z = _by_variables(self._at_nodes, slopes, z_by_T, T)
+        Z = Z.transpose(1, 0, 2, 3).reshape(*bends.shape[:2], -1)
+        hessian = Z.reshape(-1, len(at.x)).T @ (bends @ Z).reshape(-1, len(at.x))
+        hessian[:-1, :-1] += retiming.curvature(at.x, by_points)
+        hessian[:-1, -1] += mixed
+        hessian[-1, :-1] += mixed
+        by_T = float((by_cost * z_by_T).sum())
+        bent = _ORDERS * (_ORDERS + 1)
+        hessian[-1, -1] += (
+            2 * by_T / T
+            + (
+                float((by_nodes * bent * at.z).sum())
+                + float((by_path * bent[:2] * at.at_path).sum())
+                # limits on rates are proportional to T^d with d = 1 to 3
+                - float((np.abs(of_rates) * bent).sum())
+            )
+            / T**2
+        )
+        return RetimingDerivatives(
+            gradient=np.append(
+                retiming.by_control_values(at.x, _by_points(self._at_nodes, by_cost, T)),
+                float(space.weights @ cost) + by_T,
+            ),
+            hessian=(hessian + hessian.T) / 2,
+            slopes=slopes,
+            torque_by_y=torque_by_y,
             path=path,
             speed=speed,
+            least_by_values=least_by_values,
         )
 
-    def gradient(self, x: Array) -> Array:
-        """Gradient of the cost, shape (n,) [J]."""
-        state, space, T = self.state(x), self.retiming.space, float(np.exp(x[-1]))
-        count, nq = state.torque.shape
-        by_z = T * space.weights[:, None] * state.cost_by_y.reshape(count, 3, nq).swapaxes(0, 1)
-        by_points = np.tensordot(_over_powers(space.at_nodes, 0, T), by_z, axes=((0, 1), (0, 1)))
-        by_duration = state.integral - np.arange(3) @ (by_z * state.z).sum(axis=(1, 2))
-        return np.append(self.retiming.by_control_values(x, by_points), by_duration)
+    def _along(self, at: RetimingValues) -> tuple[ConstraintRatios, ConstraintRatios, Array]:
+        """Path constraints, the speed, and the slopes of the least speed at the path points."""
+        count, nq = at.at_path.shape[1:]
+        gradients = np.zeros((count, 0, nq))
+        path = speed = ConstraintRatios(np.zeros((count, 0)), gradients, gradients)
+        slopes = np.zeros((count, len(at.x) - 1))
+        if self._path is not None:
+            path = self._path.linearised(*at.at_path)
+        if self._least is not None:
+            speed = self._least.linearised(*at.at_path)
+            _, slopes = self.retiming.least_speed_at_path(at.x)
+        return path, speed, slopes
 
-    def slopes(self, x: Array, rows: Mask) -> Array:
-        """Gradients of the constraints of the mask `rows` (rows,), shape (k, n)."""
-        state, T = self.state(x), float(np.exp(x[-1]))
-        rates, torque, path, speed, rising = np.split(rows, np.cumsum(state.sizes))
-        slopes = self.retiming.slopes(x)
+    def predicted(self, at: RetimingValues, line: RetimingDerivatives, dx: Array) -> Array:
+        """Ratios (rows,) after a step dx (m + 1,), by the linear models.
+
+        The magnitudes of rates are relative to their limits after the step.
+        """
+        T, dP, stretch = at.T, line.slopes @ dx[:-1], float(dx[-1]) / at.T
+        dz = _over_powers(self._at_nodes @ dP, 0, T) - _ORDERS * at.z * stretch
+        rates = at.ratios[0] + (
+            _over_powers(self.retiming.at_rates @ dP, 1, T) / self.limits.rates[:, None]
+        )
+        dq, dv = _over_powers(self._at_path @ dP, 0, T) - _ORDERS[:2] * at.at_path * stretch
+        path, speed = (
+            (each.by_q @ dq[..., None] + each.by_v @ dv[..., None])[..., 0]
+            for each in (line.path, line.speed)
+        )
+        return np.concatenate(
+            [
+                (rates - np.sign(rates) * (_ORDERS + 1) * stretch).ravel(),
+                (at.ratios[1] + (line.torque_by_y @ _states(dz)[..., None])[..., 0]).ravel(),
+                (at.ratios[2] + path).ravel(),
+                (at.ratios[3] - speed + (line.least_by_values @ dx[:-1])[:, None]).ravel(),
+            ]
+        )
+
+    def rows(
+        self, at: RetimingValues, line: RetimingDerivatives, chosen: Mask, signs: Array
+    ) -> Array:
+        """Gradients (k, m + 1) of sign · ratio for a mask `chosen` (rows,), with signs (rows,).
+
+        As in `predicted`, they are relative to the limits after a step.
+        """
+        rates, torque, path, speed = at.by_kind(chosen)
         found = [
-            self._rate_slopes(state, slopes, T, rates.reshape(state.rates.shape)),
-            self._torque_slopes(state, slopes, T, torque.reshape(state.torque.shape)),
+            self._rate_rows(at, line, rates),
+            self._torque_rows(at, line, torque),
+            self._path_rows(at, line, line.path, path),
+            -self._path_rows(at, line, line.speed, speed),
         ]
-        if state.path is not None:
-            found.append(-self._path_slopes(state, state.path, slopes, T, path))
-        if state.speed is not None:
-            found.append(self._path_slopes(state, state.speed, slopes, T, speed))
-            found[-1][:, :-1] -= self.retiming.least_speed_at_path(x)[1][speed]
-        return np.concatenate([*found, self._rising[rising]])
+        found[3][:, :-1] += line.least_by_values[np.nonzero(speed)[0]]
+        rows = np.concatenate(found) * signs[chosen][:, None]
+        rows[: len(found[0]), -1] = -(np.nonzero(rates)[0] + 1) / at.T
+        return rows
 
-    def _rate_slopes(self, state: RetimingState, slopes: Array, T: float, rows: Mask) -> Array:
+    def _rate_rows(self, at: RetimingValues, line: RetimingDerivatives, rows: Mask) -> Array:
         order, point, joint = np.nonzero(rows)
-        value = state.rates[rows]
-        found = np.empty((len(value), slopes.shape[2] + 1))
-        found[:, -1] = -(order + 1) * value
+        found = np.zeros((len(order), len(at.x)))
         for each in range(rows.shape[2]):
             own = joint == each
-            scale = np.power(T, order[own] + 1) * self.limits.rates[order[own], each]
+            scale = np.power(at.T, order[own] + 1) * self.limits.rates[order[own], each]
             basis = self.retiming.at_rates[order[own], point[own]] / scale[:, None]
-            found[own, :-1] = basis @ slopes[:, each]
-        return -2 * value[:, None] * found
+            found[own, :-1] = basis @ line.slopes[:, each]
+        return found
 
-    def _torque_slopes(self, state: RetimingState, slopes: Array, T: float, rows: Mask) -> Array:
+    def _torque_rows(self, at: RetimingValues, line: RetimingDerivatives, rows: Mask) -> Array:
         (nodes,) = np.nonzero(rows.any(axis=1))
-        Z = _by_variables(self.retiming.space.at_nodes[:, nodes], slopes, state.z[:, nodes], T)
-        by_x = _products(state.torque_by_y[rows], Z, rows[nodes])
-        return -2 * state.torque[rows][:, None] * by_x
+        z_by_T = -_ORDERS * at.z[:, nodes] / at.T
+        Z = _by_variables(self._at_nodes[:, nodes], line.slopes, z_by_T, at.T)
+        return _products(line.torque_by_y[rows], Z, rows[nodes])
 
-    def _path_slopes(
-        self, state: RetimingState, ratios: ConstraintRatios, slopes: Array, T: float, rows: Mask
+    def _path_rows(
+        self, at: RetimingValues, line: RetimingDerivatives, ratios: ConstraintRatios, rows: Mask
     ) -> Array:
-        rows = rows.reshape(ratios.value.shape)
         (points,) = np.nonzero(rows.any(axis=1))
-        basis = self.retiming.space.at_path[:, points]
-        Z = _by_variables(basis, slopes, state.at_path[:, points], T)
+        z_by_T = -_ORDERS[:2] * at.at_path[:, points] / at.T
+        Z = _by_variables(self._at_path[:, points], line.slopes, z_by_T, at.T)
         return _products(np.hstack([ratios.by_q[rows], ratios.by_v[rows]]), Z, rows[points])
 
 
@@ -256,24 +211,49 @@ def _over_powers(values: Array, first: int, T: float) -> Array:
     return values / np.power(T, np.arange(first, first + len(values)))[:, None, None]
 
 
-def _by_variables(basis: Array, slopes: Array, values: Array, T: float) -> Array:
-    """Derivatives by x of q, v, a at some instants.
+def _states(z: Array) -> Array:
+    """q, v, a (3, N, nq) node by node, shape (N, 3 nq)."""
+    return np.ascontiguousarray(z.transpose(1, 0, 2)).reshape(z.shape[1], -1)
 
-    By the logarithm of T, a value divided by T^d has the derivative -d times itself.
+
+def _parts(by_y: Array) -> Array:
+    """Derivatives (N, 3 nq) by q, v and a, shape (3, N, nq)."""
+    return by_y.reshape(len(by_y), 3, -1).transpose(1, 0, 2)
+
+
+def _weighted(multipliers: Array, gradients: Array) -> Array:
+    """Σ_c multiplier · gradient, shape (k, n), for multipliers (k, c) and gradients (k, c, n)."""
+    return np.asarray((multipliers[:, None] @ gradients)[:, 0])
+
+
+def _by_points(basis: Array, by_z: Array, T: float, first: int = 0) -> Array:
+    """Derivatives (n, nq) by the control points.
+
+    Args:
+        basis: maps from control points to values times T^d, shape (d, k, n).
+        by_z: derivatives by the values, shape (d, k, nq).
+        T: duration [s].
+        first: smallest power of T.
+    """
+    return np.tensordot(_over_powers(basis, first, T), by_z, axes=((0, 1), (0, 1)))
+
+
+def _by_variables(basis: Array, slopes: Array, z_by_T: Array, T: float) -> Array:
+    """Derivatives by x of q, v, a at some instants.
 
     Args:
         basis: maps from control points to values times T^d, shape (d, k, n).
         slopes: derivatives of the control points by the control values, shape (n, nq, m).
-        values: the values, shape (d, k, nq).
+        z_by_T: derivatives of the values by the duration, shape (d, k, nq).
         T: duration [s].
 
     Returns:
         The derivatives, shape (d, k, nq, m + 1).
     """
-    found = np.empty((*values.shape, slopes.shape[2] + 1))
+    found = np.empty((*z_by_T.shape, slopes.shape[2] + 1))
     by_points = _over_powers(basis, 0, T).reshape(-1, len(slopes)) @ slopes.reshape(len(slopes), -1)
-    found[..., :-1] = by_points.reshape(*values.shape, slopes.shape[2])
-    found[..., -1] = -np.arange(len(values))[:, None, None] * values
+    found[..., :-1] = by_points.reshape(*z_by_T.shape, slopes.shape[2])
+    found[..., -1] = z_by_T
     return found
 
 
@@ -282,11 +262,11 @@ def _products(gradients: Array, Z: Array, rows: Mask) -> Array:
 
     Args:
         gradients: gradients of the constraints of `rows`, in their order, shape (r, d nq).
-        Z: derivatives of q, v and a at k instants by x, shape (d, k, nq, n).
+        Z: derivatives of q, v and a at k instants by x, shape (d, k, nq, m + 1).
         rows: mask (k, c) of constraints at the instants.
 
     Returns:
-        The derivatives, shape (r, n).
+        The derivatives, shape (r, m + 1).
     """
     instant, _ = np.nonzero(rows)
     orders, _, nq, count = Z.shape

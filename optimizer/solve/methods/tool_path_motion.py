@@ -12,7 +12,6 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace
-from joulepath.optimizer.motion.bspline import DEGREE, Basis
 from joulepath.optimizer.motion.spline import Spline, sampled
 from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.problem.tool_path import ToolPath
@@ -35,20 +34,17 @@ from joulepath.optimizer.solve.methods.tool_turning import TurnedAtEnd, turned_p
 class ToolPathMotionSettings:
     """Settings of motions along a tool path."""
 
-    finer_scaling: int = 2
-    """Factor on the spans in the second time scaling."""
-
-    most_scaling_spans: int = 72
-    """Largest number of spans of the second time scaling."""
-
-    further_spans: int = 12
-    """Spans of the motion in addition to the spans of its path."""
-
-    most_first_spans: int = 67
-    """Largest number of spans of the motion at first."""
-
-    refinements: tuple[int, ...] = (1, 2, 4, 8)
+    refinements: tuple[float, ...] = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
     """Factors on the spans of the motion, tried until the motion keeps to the path."""
+
+    failures: int = 2
+    """Successive factors without a motion within the limits after which no finer one is tried."""
+
+    finer: tuple[float, ...] = (1.5, 3.0)
+    """First factors of second solves."""
+
+    most_finer_spans: int = 120
+    """Largest number of spans of second solves: they gain little on long paths."""
 
     nearly: float = 1.1
     """Ratio of durations beyond which a finer time scaling is not tried: it gains less time."""
@@ -91,15 +87,14 @@ class ToolPathMotion(Method):
                 return SolveResult(
                     SolveStatus.INFEASIBLE, SolveReason.LEAST_SPEED_OUT_OF_REACH, figures=slow
                 )
-        first = self._laws.scaling(1)
-        results = [self._solved_along(path, each, first) for each in self._intervals()]
+        results = [self._solved_along(path, each) for each in self._intervals()]
         if all(result.spline is None for result in results) and not self._holds_speed:
             results += self._nearly_fastest(path)
         found = self._without_collision(
             min(results, key=lambda result: self.cost_of(result.spline))
         )
         if found.spline is None and self._may_turn():
-            self._solve_turned(self._laws.paced(path), self._laws.scaling(1), np.inf, results)
+            self._solve_turned(self._laws.paced(path), 1.0, np.inf, results)
             found = min([found, *results], key=lambda result: self.cost_of(result.spline))
         return with_effort(found, results)
 
@@ -111,7 +106,7 @@ class ToolPathMotion(Method):
         """
         law, results = None, list[SolveResult]()
         if self.t_max < DURATIONS.longest:
-            fast = self._solved_along(path, fastest(self.prepared), self._laws.scaling(1))
+            fast = self._solved_along(path, fastest(self.prepared))
             results.append(replace(fast, status=SolveStatus.FAILED, spline=None))
             if (
                 fast.spline is not None
@@ -124,14 +119,13 @@ class ToolPathMotion(Method):
                 )
                 return [*results, too_slow]
             law = None if fast.spline is None else on_path(path, *sampled(fast.spline))
-        finer = self._laws.scaling(TOOL_PATH_MOTION.finer_scaling)
-        return [*results, self._solved_along(path, self.interval, finer, law)]
+        return [*results, self._solved_along(path, self.interval, law, TOOL_PATH_MOTION.finer[0])]
 
     def _clear_along(
-        self, path: Spline, scaling: Basis, law: tuple[Array, Array] | None = None
+        self, path: Spline, law: tuple[Array, Array] | None = None, finer: float = 1.0
     ) -> SolveResult:
         """The result of `_solved_along`, without its motion if that collides."""
-        return self._without_collision(self._solved_along(path, self.interval, scaling, law))
+        return self._without_collision(self._solved_along(path, self.interval, law, finer))
 
     def _without_collision(self, found: SolveResult) -> SolveResult:
         """The result, without its motion if that collides."""
@@ -162,7 +156,7 @@ class ToolPathMotion(Method):
         )
 
     def _solve_turned(
-        self, law: tuple[Array, Array], scaling: Basis, least: float, results: list[SolveResult]
+        self, law: tuple[Array, Array], finer: float, least: float, results: list[SolveResult]
     ) -> None:
         """Solve with other turnings of the tool.
 
@@ -172,7 +166,7 @@ class ToolPathMotion(Method):
 
         Args:
             law: times (k,) [s], and fractions (k,) of the path, with which turnings are compared.
-            scaling: space of the time scaling.
+            finer: factor on the number of spans.
             least: cost below which the path of a motion is kept [J].
             results: list to which the results are appended.
         """
@@ -201,18 +195,18 @@ class ToolPathMotion(Method):
                 trace, path, coarse = found
                 assert coarse.spline is not None
                 own = on_path(path, *sampled(coarse.spline))
-                fine = self._clear_along(path, scaling, own)
+                fine = self._clear_along(path, own, finer)
                 if any([is_best(trace, path, coarse), is_best(trace, path, fine)]):
                     q_start, law = trace.q[0], own
         for trace, path in turned_paths(prepared, q_start, self.q_goal, *law):
-            is_best(trace, path, self._clear_along(path, scaling, law))
+            is_best(trace, path, self._clear_along(path, law, finer))
         for trace, path in held:
-            is_best(trace, path, self._clear_along(path, scaling, first_law))
+            is_best(trace, path, self._clear_along(path, first_law, finer))
 
     def _at_best_angle(
         self, turned: TurnedAtEnd, results: list[SolveResult]
     ) -> tuple[Trace, Spline, SolveResult] | None:
-        """Find the best angle of the tool at an end, by motions of the first time scaling.
+        """Find the best angle of the tool at an end, by motions of the first spaces.
 
         Args:
             turned: paths with other angles at an end.
@@ -227,7 +221,7 @@ class ToolPathMotion(Method):
             followed = turned.by(angle)
             if followed is None:
                 return np.inf
-            result = self._clear_along(followed[1], self._laws.scaling(1))
+            result = self._clear_along(followed[1])
             results.append(replace(result, status=SolveStatus.FAILED, spline=None))
             found.append(
                 (self.cost_of(result.spline), *followed, replace(result, iterations=0, solves=0))
@@ -252,22 +246,24 @@ class ToolPathMotion(Method):
             fine: not available: the result has no motion.
         """
         path = self.prepared.followed.joint_path(self.q_start)
-        scaling = self._laws.scaling(TOOL_PATH_MOTION.finer_scaling)
         failed = SolveResult(SolveStatus.FAILED, SolveReason.NO_FINER_SCALING)
         if fine or path is None:
             return failed
         results, law = [failed], on_path(path, q, t)
+        most = TOOL_PATH_MOTION.most_finer_spans
+        factors = [each for each in TOOL_PATH_MOTION.finer if self._laws.spans(path, each) <= most]
         try:
             with watch(self.deadline):
                 if self._holds_speed:
-                    results.append(self._clear_along(path, scaling))
-                elif scaling.n > TOOL_PATH_MOTION.most_scaling_spans + DEGREE:
-                    scaling = self._laws.scaling(1)
+                    results.append(self._clear_along(path))
                 else:
-                    results.append(self._solved_along(path, self.interval, scaling, law))
+                    # a result before the deadline counts
+                    results.extend(
+                        self._solved_along(path, self.interval, law, finer) for finer in factors
+                    )
                 if self._may_turn():
                     least = min(self.cost_of(result.spline) for result in results)
-                    self._solve_turned(law, scaling, least, results)
+                    self._solve_turned(law, max(factors, default=1.0), least, results)
         except DeadlinePassed:
             results.append(SolveResult(SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED))
         return with_effort(min(results, key=lambda result: self.cost_of(result.spline)), results)
@@ -286,42 +282,39 @@ class ToolPathMotion(Method):
         self,
         path: Spline,
         interval: DurationInterval,
-        scaling: Basis,
         law: tuple[Array, Array] | None = None,
+        finer: float = 1.0,
     ) -> SolveResult:
         """Solve for the time scaling, in a space fine enough for the tolerance of the path.
 
-        At a fixed speed only the ramps are chosen.
+        The spans of each space are short where the motion found before is at bends. At a fixed
+        speed only the ramps are chosen.
 
         Args:
             path: path of the joints.
             interval: allowed durations and the cost.
-            scaling: space of the time scaling.
             law: initial guess, as times (k,) [s] and fractions (k,) of the path; None for one
                 that slows down at bends.
+            finer: factor on the numbers of spans.
         """
         if self._holds_speed:
             speed = self._tool_path.fixed_speed
             assert speed is not None
             return EvenSpeed(self.prepared, path, interval, speed, self._laws.keeps_to_path).solve()
-        results, x = list[SolveResult](), None
-        t, s = law or self._laws.paced(path)
-        spans = len(np.unique(path.knots)) + TOOL_PATH_MOTION.further_spans
-        spans = min(spans, TOOL_PATH_MOTION.most_first_spans)
-        for finer in TOOL_PATH_MOTION.refinements:
-            retiming = PathRetiming(
-                self.prepared, path, interval, self._laws.space(spans * finer), scaling
-            )
-            results.append(retiming.solve(retiming.variables(s, t) if x is None else x))
-            found, x = results[-1].spline, retiming.found
-            if found is None and self.prepared.least_speed is not None:
-                results[-1] = replace(results[-1], reason=SolveReason.LEAST_SPEED_NOT_KEPT)
-            if found is None or self._laws.keeps_to_path(found):
-                return with_effort(results[-1], results)
-        failed = replace(
-            results[-1],
-            status=SolveStatus.FAILED,
-            reason=SolveReason.TOLERANCE_NOT_KEPT,
-            spline=None,
-        )
-        return with_effort(failed, results)
+        results, failures, law = list[SolveResult](), 0, law or self._laws.paced(path)
+        for factor in TOOL_PATH_MOTION.refinements:
+            space = self._laws.space(path, law, factor * finer)
+            retiming = PathRetiming(self.prepared, path, interval, space, space)
+            t, s = law
+            found = retiming.solve(retiming.variables(s, t), self._laws.keeps_to_path)
+            if found.reason is SolveReason.NO_MOTION_ALONG_PATH:
+                failures += 1
+                if self.prepared.least_speed is not None:
+                    found = replace(found, reason=SolveReason.LEAST_SPEED_NOT_KEPT)
+            else:
+                failures = 0
+            results.append(found)
+            if found.spline is not None or failures == TOOL_PATH_MOTION.failures:
+                break
+            law = retiming.law(retiming.found)
+        return with_effort(results[-1], results)

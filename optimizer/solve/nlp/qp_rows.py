@@ -76,16 +76,16 @@ class PlacedRows:
 class QPRows:
     """Constraints least ≤ A y ≤ most in whitened variables y; rows are added at the end.
 
+    Args:
+        whitening: W with x = W y, shape (n, k).
+
     Attributes:
-        rates: rows of limits on rates, by derivative, coordinate and grid point.
-        bounds: rows of bounds of variables, by side and variable.
-        path: rows of path constraints, by path point and column.
-        chosen: lower and upper limits on rates with a row, shape (2, 3, r, M).
-        bounded: lower and upper bounds with a row, shape (2, n).
+        count: number of rows.
+        gradients: gradients of the rows by x, in the order of their addition.
     """
 
-    def __init__(self, whitening: Array, grid: tuple[int, ...]) -> None:
-        self.whitening, (n, size) = whitening, whitening.shape
+    def __init__(self, whitening: Array) -> None:
+        self.whitening, size = whitening, whitening.shape[1]
         self.count = self._transformed = 0
         self.gradients, self._fresh = list[Array](), list[Array]()
         # the first `count` rows are in use
@@ -93,8 +93,6 @@ class QPRows:
         self._A = np.empty((rows, size))
         self._least, self._most = np.empty(rows), np.empty(rows)
         self._hard, self._active = np.empty(rows, dtype=bool), np.empty(rows, dtype=bool)
-        self.chosen, self.bounded = np.zeros((2, *grid), dtype=bool), np.zeros((2, n), dtype=bool)
-        self.rates, self.bounds, self.path = PlacedRows(3), PlacedRows(2), PlacedRows(2)
         self._identity = np.eye(size)
 
     def add(
@@ -127,6 +125,10 @@ class QPRows:
         self._hard[rows], self._active[rows] = hard, active
         return np.arange(first, self.count)
 
+    def replace_bounds(self, rows: Index, most: Array) -> None:
+        """Replace the upper bounds (rows,) of rows."""
+        self._most[rows] = most
+
     def _double_memory(self) -> None:
         """Allocate memory for twice as many rows."""
         for name in ("_A", "_least", "_most", "_hard", "_active"):
@@ -139,34 +141,6 @@ class QPRows:
             rows = slice(self._transformed, self.count)
             np.matmul(np.concatenate(self._fresh), self.whitening, out=self._A[rows])
         self._fresh, self._transformed = [], self.count
-
-    def add_kinematic(
-        self,
-        gradients: Array,
-        most: Array,
-        places: Places,
-        upper: Mask,
-        active: Mask | bool = False,
-    ) -> None:
-        """Add `upper` or lower limits on rates at places without such a row; see `add`."""
-        self.rates.add(self.add(gradients, most, active=active), places)
-        self.chosen[upper.astype(int), *places] = True
-
-    def add_path(
-        self, gradients: Array, slack: Array, passed: tuple[Index, Index], active: Mask
-    ) -> None:
-        """Add path constraints without a row yet; see `add`."""
-        self.path.add(self.add(gradients, slack, active=active), passed)
-
-    def add_bounds(self, bounds: Array, wanted: Mask) -> None:
-        """Add the `wanted` (2, n) lower and upper bounds of variables without a row yet."""
-        sides = np.nonzero(wanted & ~self.bounded)
-        side, variable = sides
-        gradients = np.zeros((len(side), len(self.whitening)))
-        sign = np.where(side, 1.0, -1.0)
-        gradients[np.arange(len(side)), variable] = sign
-        self.bounds.add(self.add(gradients, sign * bounds[sides], hard=True), sides)
-        self.bounded[sides] = True
 
     def solve(self, gradient: Array, relax: bool) -> tuple[Array, Array, bool]:
         """Minimise ½ yᵀ y + gradientᵀ y within the rows.
@@ -207,3 +181,53 @@ class QPRows:
             # active set from which the next solve starts
             active[:] = info["lam"] > 0
         return y, info["lam"], found
+
+
+class ProgramRows(QPRows):
+    """Rows of a `NonlinearProgram`, with their places in it.
+
+    Args:
+        whitening: as of `QPRows`.
+        grid: numbers (3, r, M) of derivatives, coordinates and grid points.
+
+    Attributes:
+        rates: rows of limits on rates, by derivative, coordinate and grid point.
+        bounds: rows of bounds of variables, by side and variable.
+        path: rows of path constraints, by path point and column.
+        chosen: lower and upper limits on rates with a row, shape (2, 3, r, M).
+        bounded: lower and upper bounds with a row, shape (2, n).
+    """
+
+    def __init__(self, whitening: Array, grid: tuple[int, ...]) -> None:
+        super().__init__(whitening)
+        self.chosen = np.zeros((2, *grid), dtype=bool)
+        self.bounded = np.zeros((2, len(whitening)), dtype=bool)
+        self.rates, self.bounds, self.path = PlacedRows(3), PlacedRows(2), PlacedRows(2)
+
+    def add_kinematic(
+        self,
+        gradients: Array,
+        most: Array,
+        places: Places,
+        upper: Mask,
+        active: Mask | bool = False,
+    ) -> None:
+        """Add `upper` or lower limits on rates at places without such a row; see `add`."""
+        self.rates.add(self.add(gradients, most, active=active), places)
+        self.chosen[upper.astype(int), *places] = True
+
+    def add_path(
+        self, gradients: Array, slack: Array, passed: tuple[Index, Index], active: Mask
+    ) -> None:
+        """Add path constraints without a row yet; see `add`."""
+        self.path.add(self.add(gradients, slack, active=active), passed)
+
+    def add_bounds(self, bounds: Array, wanted: Mask) -> None:
+        """Add the `wanted` (2, n) lower and upper bounds of variables without a row yet."""
+        sides = np.nonzero(wanted & ~self.bounded)
+        side, variable = sides
+        gradients = np.zeros((len(side), len(self.whitening)))
+        sign = np.where(side, 1.0, -1.0)
+        gradients[np.arange(len(side)), variable] = sign
+        self.bounds.add(self.add(gradients, sign * bounds[sides], hard=True), sides)
+        self.bounded[sides] = True

@@ -24,7 +24,7 @@ from joulepath.optimizer.solve.nlp.qp_data import (
     places_of,
     shortened,
 )
-from joulepath.optimizer.solve.nlp.qp_rows import Places, QPRows
+from joulepath.optimizer.solve.nlp.qp_rows import Places, ProgramRows
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,8 @@ class WorkingSetQP:
             The step; None if even the relaxed QP has no solution.
         """
         torque = self._torque_rows(at)
-        rows, bounds = QPRows(at.whitening, at.ratio.shape), np.array(self._bounds(at.free, at.T))
+        bounds = np.array(self._bounds(at.free, at.T))
+        rows = ProgramRows(at.whitening, at.ratio.shape)
         self._add_goal(rows, at.free)
         path = self._first_path_rows(rows, at)
         limited = rows.add(torque.gradients, torque.slack)
@@ -144,7 +145,7 @@ class WorkingSetQP:
 
     def _solution(
         self,
-        rows: QPRows,
+        rows: ProgramRows,
         torque: TorqueRows,
         limited: Index,
         x: Array,
@@ -181,7 +182,7 @@ class WorkingSetQP:
             pull,
         )
 
-    def _first_path_rows(self, rows: QPRows, at: QPInputs) -> NearPathConstraints:
+    def _first_path_rows(self, rows: ProgramRows, at: QPInputs) -> NearPathConstraints:
         """Add the path constraints of the first solve; returns the others near their bounds."""
         near = self.p.path_rows.near(at.path_values, WORKING_SET.near_path)
         if not len(near.slack):
@@ -193,7 +194,7 @@ class WorkingSetQP:
         return self._add_path(rows, at, near, at_once)
 
     def _add_path(
-        self, rows: QPRows, at: QPInputs, near: NearPathConstraints, wanted: Mask
+        self, rows: ProgramRows, at: QPInputs, near: NearPathConstraints, wanted: Mask
     ) -> NearPathConstraints:
         """Add the `wanted` path constraints, and return the others."""
         added = near[np.flatnonzero(wanted)]
@@ -203,7 +204,7 @@ class WorkingSetQP:
         return near[np.flatnonzero(~wanted)]
 
     def _adds_path(
-        self, rows: QPRows, at: QPInputs, near: NearPathConstraints, x: Array
+        self, rows: ProgramRows, at: QPInputs, near: NearPathConstraints, x: Array
     ) -> tuple[bool, NearPathConstraints]:
         """Add the path constraints without a row that the step x violates.
 
@@ -220,7 +221,7 @@ class WorkingSetQP:
         )
         return bool(broken.any()), self._add_path(rows, at, near, broken)
 
-    def _add_kinematic(self, rows: QPRows, at: QPInputs) -> None:
+    def _add_kinematic(self, rows: ProgramRows, at: QPInputs) -> None:
         """Add the limits on rates of the first solve."""
         chosen = self._active.copy()
         near = WORKING_SET.near_rate_later if chosen.any() else WORKING_SET.near_rate
@@ -242,7 +243,7 @@ class WorkingSetQP:
         k, grid = places_of((size > above[d, None]) & (self._anchors[d] | peaks(size)))
         return d[k], j[k], grid
 
-    def _adds_bounds(self, rows: QPRows, bounds: Array, x: Array) -> bool:
+    def _adds_bounds(self, rows: ProgramRows, bounds: Array, x: Array) -> bool:
         """Add all bounds if the step x violates one without a row; whether it does.
 
         A step without bounds may be so long that it violates every limit.
@@ -254,7 +255,7 @@ class WorkingSetQP:
         rows.add_bounds(bounds, np.ones_like(rows.bounded))
         return True
 
-    def _adds_rates(self, rows: QPRows, at: QPInputs, x: Array) -> bool:
+    def _adds_rates(self, rows: ProgramRows, at: QPInputs, x: Array) -> bool:
         """Add the peaks of limits on rates without a row that the step x violates; whether any."""
         change = x[: self.count].reshape(at.free.shape).T / at.rates[:, :, None]
         predicted = change @ self._grid_free.swapaxes(1, 2)
@@ -274,9 +275,14 @@ class WorkingSetQP:
         return True
 
     def _add_rates(
-        self, rows: QPRows, at: QPInputs, places: Places, upper: Mask, active: Mask | bool = False
+        self,
+        rows: ProgramRows,
+        at: QPInputs,
+        places: Places,
+        upper: Mask,
+        active: Mask | bool = False,
     ) -> None:
-        """Add the `upper` or lower limits on rates at places; `active` as of `QPRows.add`."""
+        """Add the `upper` or lower limits on rates at places; `active` as of `ProgramRows.add`."""
         signs = np.where(upper, 1.0, -1.0)
         rows.add_kinematic(
             self._kinematic_rows(at, places, signs),
@@ -333,7 +339,7 @@ class WorkingSetQP:
             upper = np.append(upper, min(p.t_max - T, T) / self.time_scale)
         return lower, upper
 
-    def _add_goal(self, rows: QPRows, free: Array) -> None:
+    def _add_goal(self, rows: ProgramRows, free: Array) -> None:
         """Add the goal constraints as bounds on the change of the goal, unless it is fixed."""
         constraints = self.p.goal_constraints
         if constraints is None:

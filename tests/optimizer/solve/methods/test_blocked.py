@@ -16,7 +16,6 @@ from joulepath import (
     Problem,
     Scene,
     Sphere,
-    ToolCone,
     optimize,
 )
 from joulepath.models.robot import Array
@@ -27,16 +26,13 @@ from joulepath.optimizer.motion.spline import least_time_scale, retimed, spline_
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.solve.methods import METHODS, planned_paths, solver_for
-from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
 from joulepath.optimizer.solve.methods.planned_paths import (
     PLANNED_PATHS,
     plan,
     smooth_path,
     to_goal,
 )
-from joulepath.optimizer.solve.methods.retiming_program import RetimingProgram
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.solve_result import (
     MotionOrigin,
@@ -54,10 +50,6 @@ DEADLINE = 60.0
 FEW_STATES = 2_000
 # distance between a motion and its path, from the fit of a spline and from sampling [rad]
 FIT_TOLERANCE = 2e-3
-# step of the retiming's variables in central differences
-EPS = 1e-6
-# relative tolerance of the differences; friction reverses within a few mrad/s
-DIFFERENCE_TOLERANCE = 2e-4
 # relative excess over a limit, as of the certificate
 LIMIT_TOLERANCE = 1e-6
 
@@ -183,37 +175,6 @@ def test_time_scaling_along_a_path_needs_no_more_energy_than_the_quintic_law() -
         for k in np.linspace(1.0, 3.0, 41)
     ]
     assert prepared.energy(result.spline).electrical.total < min(energies)
-
-
-def test_gradients_of_the_retiming() -> None:
-    """Cost and constraints, with tool cone and TCP speed, compared with central differences."""
-    cone = ToolCone(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), 1.5)
-    prepared = PreparedProblem.of(
-        problem_with(
-            START, GOAL, scene=Scene((POST,)), method="time_scaling", tool_cone=cone, tcp_speed=1.0
-        )
-    )
-    smooth = smooth_path(prepared, planned_path(prepared))
-    assert smooth is not None
-    retiming = PathRetiming(prepared, smooth, duration_intervals(prepared, GOAL)[0])
-    limits = prepared.problem.arm.active_limits
-    assert prepared.path is not None
-    first = np.append(retiming.scaling.quintic[retiming.scaling.free], np.log(2.0))
-    program = RetimingProgram(retiming, limits, np.ones(len(prepared.path.names)), first)
-    # not at the symmetric point, at which some derivatives vanish
-    x = first + np.random.default_rng(5).uniform(-0.01, 0.01, len(first))
-    state, gradient = program.state(x), program.gradient(x)
-    by_x = program.slopes(x, np.ones(state.slack.shape, dtype=bool))
-    for k in range(len(x)):
-        step = EPS * np.eye(len(x))[k]
-        ahead, behind = program.state(x + step), program.state(x - step)
-        slope = (ahead.cost - behind.cost) / (2 * EPS)
-        assert gradient[k] == pytest.approx(
-            slope, rel=DIFFERENCE_TOLERANCE, abs=DIFFERENCE_TOLERANCE * abs(state.cost)
-        )
-        slopes = (ahead.slack - behind.slack) / (2 * EPS)
-        scale = 1 + np.abs(slopes).max()
-        assert np.abs(by_x[:, k] - slopes).max() < DIFFERENCE_TOLERANCE * scale
 
 
 @pytest.mark.parametrize("method", long_but(["time_scaling"], ["time_scaling", "uniform_scaling"]))

@@ -10,7 +10,7 @@ import pytest
 from joulepath.models.robot import Array
 from joulepath.optimizer.solve.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
 from joulepath.optimizer.solve.nlp.qp_data import QPInputs
-from joulepath.optimizer.solve.nlp.qp_rows import QP_ROWS, QPRows
+from joulepath.optimizer.solve.nlp.qp_rows import QP_ROWS, ProgramRows
 from joulepath.optimizer.solve.nlp.working_set_qp import WORKING_SET, WorkingSetQP
 from tests.optimizer.moves import GOAL, START
 from tests.optimizer.solve.nlp.test_sqp import program, quintic, shortest
@@ -114,7 +114,7 @@ def test_rows_added_one_by_one_are_those_added_at_once() -> None:
         rng.uniform(0.05, 1.0, count),
         rng.normal(size=n),
     )
-    at_once, one_by_one = (QPRows(np.eye(n), (3, 1, 1)) for _ in range(2))
+    at_once, one_by_one = (ProgramRows(np.eye(n), (3, 1, 1)) for _ in range(2))
     at_once.add(A, most)
     for k in range(count):
         if k == count // 2:
