@@ -68,7 +68,8 @@ class PathRetiming(RetimedPath):
         prepared = self.prepared
         limits = prepared.problem.arm.active_limits.scaled(1 - LIMIT_REPAIR.margin)
         bounds = initial_bounds(prepared.path)
-        x = self._first(limits) if guess is None else guess
+        x = (self._first(limits) if guess is None else guess).copy()
+        x[-1] = np.clip(x[-1], self.interval.t_min, self.interval.t_max)
         none = np.zeros(len(self.path.control_points[0]))
         iterations = 0
         for solves in range(1, PATH_RETIMING.repairs + 1):

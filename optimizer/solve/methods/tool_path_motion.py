@@ -87,7 +87,11 @@ class ToolPathMotion(Method):
                 return SolveResult(
                     SolveStatus.INFEASIBLE, SolveReason.LEAST_SPEED_OUT_OF_REACH, figures=slow
                 )
-        results = [self._solved_along(path, each) for each in self._intervals()]
+        results, law = list[SolveResult](), None
+        for interval in self._intervals():
+            results.append(self._solved_along(path, interval, law))
+            spline = results[-1].spline
+            law = None if spline is None else on_path(path, *sampled(spline))
         if all(result.spline is None for result in results) and not self._holds_speed:
             results += self._nearly_fastest(path)
         found = self._without_collision(

@@ -32,6 +32,8 @@ PATH_POINTS = 12
 OFF_GUESS = 0.01
 # least decrease of an error of second order when the step is halved, with third orders
 SECOND_ORDER = 3.5
+# duration of a slow motion [s], and a decrease of its energy by the time scaling
+FIXED_DURATION, LESS = 4.0, 0.995
 # ratio above which a constraint stays on its side in a short step
 LARGE = 0.1
 # energy known for `CORNERS` corners [J], and a margin for other local optima
@@ -167,6 +169,21 @@ def test_predictions_are_wrong_by_the_second_order(case: Case) -> None:
         return float(np.abs(case.program.predicted(values, line, dx) - ahead)[large].max())
 
     assert error(1.0) / error(0.5) > SECOND_ORDER
+
+
+def test_a_guess_outside_the_durations_is_optimised() -> None:
+    """At a fixed duration, the solve does not end with the guess slowed down."""
+    program = tilted().program
+    retiming = program.retiming
+    interval = replace(retiming.interval, t_min=FIXED_DURATION, t_max=FIXED_DURATION)
+    fixed = PathRetiming(retiming.prepared, retiming.path, interval)
+    guess = np.append(fixed.scaling.quintic[fixed.scaling.free], FIXED_DURATION / 3)
+    found = fixed.solve(guess)
+    assert found.spline is not None and found.spline.duration == FIXED_DURATION
+    slowed = fixed.motion(guess)
+    prepared = retiming.prepared
+    energies = [prepared.energy(each).electrical.total for each in (found.spline, slowed)]
+    assert energies[0] < LESS * energies[1]
 
 
 def zigzag(corners: int) -> Problem:
