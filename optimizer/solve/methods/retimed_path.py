@@ -19,6 +19,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve
+from scipy.sparse import csr_matrix
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.motion import bspline
@@ -84,6 +85,8 @@ class RetimedPath:
         self.scaling = scaling or bspline.uniform(settings.scaling_points)
         at = instants_in_spans(np.unique(self.space.knots), settings.fitted_per_span)
         self._instants = self.scaling.matrix(at)
+        # a control value changes the scaling at few instants
+        self._free_instants = csr_matrix(self._instants[:, self.scaling.free])
         self._at_path = self.scaling.matrix(self.space.path_points)
         inner, self._ends = self.space.free, np.zeros((self.space.n, 2))
         self._ends[: self.space.resting, 0], self._ends[-self.space.resting :, 1] = 1.0, 1.0
@@ -108,10 +111,10 @@ class RetimedPath:
     def slopes(self, x: Array) -> Array:
         """Derivatives (n, nq, m) of the control points by the scaling's free control values."""
         tangent = self.path.curve(self._fractions(x), 1)
-        inner = self._instants[:, self.scaling.free]
-        return np.stack(
-            [(self._fit * tangent[:, j]) @ inner for j in range(tangent.shape[1])], axis=1
-        )
+        by_instants = self._fit.T[:, :, None] * tangent[:, None]
+        by_values = self._free_instants.T @ by_instants.reshape(len(tangent), -1)
+        shape = (self.space.n, tangent.shape[1], -1)
+        return np.ascontiguousarray(by_values.T).reshape(shape)
 
     def law(self, x: Array) -> tuple[Array, Array]:
         """Times (k,) [s] and fractions (k,) of the path of the variables x."""
@@ -150,8 +153,8 @@ class RetimedPath:
         """
         bend = self.path.curve(self._fractions(x), 2)
         by_fraction = ((self._fit.T @ by_points) * bend).sum(axis=1)
-        inner = self._instants[:, self.scaling.free]
-        return np.asarray((inner * by_fraction[:, None]).T @ inner)
+        inner = self._free_instants
+        return np.asarray((inner.T @ inner.multiply(by_fraction[:, None])).toarray())
 
     def least_speed_at_path(self, x: Array) -> tuple[Array, Array]:
         """The least ratio of speeds at the path points, and its derivatives.

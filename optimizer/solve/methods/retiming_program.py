@@ -6,13 +6,18 @@ The decision variables x (m + 1,) are the m free control values of the scaling a
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
+from scipy.sparse import vstack
 
 from joulepath.models.robot import Array, Limits, Mask
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.kinematics.path_constraints import ConstraintRatios
+from joulepath.optimizer.solve.methods.local_basis import LocalBasis
 from joulepath.optimizer.solve.methods.retimed_path import RetimedPath
 from joulepath.optimizer.solve.methods.retiming_state import RetimingDerivatives, RetimingValues
+from joulepath.optimizer.solve.nlp.active_path_constraints import Index
 
 _ORDERS = np.arange(3.0)[:, None, None]
 """Orders of the derivatives q, v and a."""
@@ -82,6 +87,7 @@ class RetimingProgram:
         by_cost = _parts(T * space.weights[:, None] * by_y)
         by_nodes = by_cost + _parts(_weighted(of_torque, torque_by_y))
         slopes, z_by_T = retiming.slopes(at.x), -_ORDERS * at.z / T
+        count, nq = at.z.shape[1:]
 
         # derivatives of the control points, and their change with the duration
         by_points = (
@@ -89,21 +95,24 @@ class RetimingProgram:
             + _by_points(self._at_path, by_path, T)
             + _by_points(retiming.at_rates, of_rates / self.limits.rates[:, None], T, 1)
         )
+        by_bends = _parts((bends @ _states(z_by_T)[..., None])[..., 0])
         mixed = retiming.by_control_values(
             at.x,
-            _by_points(self._at_nodes, (by_cost - _ORDERS * by_nodes) / T, T)
+            _by_points(self._at_nodes, by_bends + (by_cost - _ORDERS * by_nodes) / T, T)
             - _by_points(self._at_path, _ORDERS[:2] * by_path / T, T),
         )
-        Z = _by_variables(self._at_nodes, slopes, z_by_T, T)
-        Z = Z.transpose(1, 0, 2, 3).reshape(*bends.shape[:2], -1)
-        hessian = Z.reshape(-1, len(at.x)).T @ (bends @ Z).reshape(-1, len(at.x))
+        hessian = np.empty((len(at.x), len(at.x)))
+        powers = np.power(T, -_ORDERS[:, 0, 0])
+        bends = bends.reshape(count, 3, nq, 3, nq)
+        scaled = bends * np.outer(powers, powers)[:, None, :, None]
+        hessian[:-1, :-1] = self._near_nodes.congruent(scaled, slopes)
         hessian[:-1, :-1] += retiming.curvature(at.x, by_points)
-        hessian[:-1, -1] += mixed
-        hessian[-1, :-1] += mixed
+        hessian[:-1, -1] = hessian[-1, :-1] = mixed
         by_T = float((by_cost * z_by_T).sum())
         bent = _ORDERS * (_ORDERS + 1)
-        hessian[-1, -1] += (
-            2 * by_T / T
+        hessian[-1, -1] = (
+            float((by_bends * z_by_T).sum())
+            + 2 * by_T / T
             + (
                 float((by_nodes * bent * at.z).sum())
                 + float((by_path * bent[:2] * at.at_path).sum())
@@ -169,41 +178,63 @@ class RetimingProgram:
 
         As in `predicted`, they are relative to the limits after a step.
         """
-        rates, torque, path, speed = at.by_kind(chosen)
-        found = [
-            self._rate_rows(at, line, rates),
-            self._torque_rows(at, line, torque),
-            self._path_rows(at, line, line.path, path),
-            -self._path_rows(at, line, line.speed, speed),
-        ]
-        found[3][:, :-1] += line.least_by_values[np.nonzero(speed)[0]]
-        rows = np.concatenate(found) * signs[chosen][:, None]
-        rows[: len(found[0]), -1] = -(np.nonzero(rates)[0] + 1) / at.T
+        rates, torque, path, speed = (np.nonzero(each) for each in at.by_kind(chosen))
+        slopes = line.slopes.reshape(-1, len(at.x) - 1)
+        order, point, joint = rates
+        by_rates = np.zeros((len(order), 3, at.z.shape[2]))
+        by_rates[np.arange(len(order)), order, joint] = 1 / (
+            self.limits.rates[order, joint] * at.T ** (order + 1)
+        )
+        by_torques = line.torque_by_y[torque].reshape(-1, *by_rates.shape[1:])
+        by_path, by_speed = (
+            np.stack([each.by_q[where], each.by_v[where]], axis=1)
+            for each, where in ((line.path, path), (line.speed, speed))
+        )
+        along, by_along = np.append(path[0], speed[0]), np.concatenate([by_path, -by_speed])
+        powers = np.power(at.T, -_ORDERS[:, 0])
+        by_points = vstack(
+            [
+                self._near_rates.rows(point, by_rates),
+                self._near_nodes.rows(torque[0], by_torques * powers),
+                self._near_path.rows(along, by_along * powers[:2]),
+            ]
+        )
+        by_T = np.concatenate(
+            [
+                0 * order,
+                self._rates_by_T(at.z, torque[0], by_torques),
+                self._rates_by_T(at.at_path, along, by_along),
+            ]
+        )
+        rows = np.hstack([by_points @ slopes, by_T[:, None] / at.T])
+        rows[len(rows) - len(speed[0]) :, :-1] += line.least_by_values[speed[0]]
+        rows *= signs[chosen][:, None]
+        rows[: len(order), -1] = -(order + 1) / at.T
         return rows
 
-    def _rate_rows(self, at: RetimingValues, line: RetimingDerivatives, rows: Mask) -> Array:
-        order, point, joint = np.nonzero(rows)
-        found = np.zeros((len(order), len(at.x)))
-        for each in range(rows.shape[2]):
-            own = joint == each
-            scale = np.power(at.T, order[own] + 1) * self.limits.rates[order[own], each]
-            basis = self.retiming.at_rates[order[own], point[own]] / scale[:, None]
-            found[own, :-1] = basis @ line.slopes[:, each]
-        return found
+    @staticmethod
+    def _rates_by_T(z: Array, instants: Index, by_z: Array) -> Array:
+        """Changes (r,) of functions by the logarithm of the duration.
 
-    def _torque_rows(self, at: RetimingValues, line: RetimingDerivatives, rows: Mask) -> Array:
-        (nodes,) = np.nonzero(rows.any(axis=1))
-        z_by_T = -_ORDERS * at.z[:, nodes] / at.T
-        Z = _by_variables(self._at_nodes[:, nodes], line.slopes, z_by_T, at.T)
-        return _products(line.torque_by_y[rows], Z, rows[nodes])
+        Args:
+            z: derivatives of the spline, shape (d, k, nq).
+            instants: instants of the functions, shape (r,).
+            by_z: derivatives of the functions by z, shape (r, d, nq).
+        """
+        changes = -_ORDERS[: len(z)] * z
+        return np.asarray((changes[:, instants].swapaxes(0, 1) * by_z).sum(axis=(1, 2)))
 
-    def _path_rows(
-        self, at: RetimingValues, line: RetimingDerivatives, ratios: ConstraintRatios, rows: Mask
-    ) -> Array:
-        (points,) = np.nonzero(rows.any(axis=1))
-        z_by_T = -_ORDERS[:2] * at.at_path[:, points] / at.T
-        Z = _by_variables(self._at_path[:, points], line.slopes, z_by_T, at.T)
-        return _products(np.hstack([ratios.by_q[rows], ratios.by_v[rows]]), Z, rows[points])
+    @cached_property
+    def _near_nodes(self) -> LocalBasis:
+        return LocalBasis.of(self._at_nodes)
+
+    @cached_property
+    def _near_path(self) -> LocalBasis:
+        return LocalBasis.of(self._at_path)
+
+    @cached_property
+    def _near_rates(self) -> LocalBasis:
+        return LocalBasis.of(self.retiming.at_rates)
 
 
 def _over_powers(values: Array, first: int, T: float) -> Array:
@@ -236,39 +267,3 @@ def _by_points(basis: Array, by_z: Array, T: float, first: int = 0) -> Array:
         first: smallest power of T.
     """
     return np.tensordot(_over_powers(basis, first, T), by_z, axes=((0, 1), (0, 1)))
-
-
-def _by_variables(basis: Array, slopes: Array, z_by_T: Array, T: float) -> Array:
-    """Derivatives by x of q, v, a at some instants.
-
-    Args:
-        basis: maps from control points to values times T^d, shape (d, k, n).
-        slopes: derivatives of the control points by the control values, shape (n, nq, m).
-        z_by_T: derivatives of the values by the duration, shape (d, k, nq).
-        T: duration [s].
-
-    Returns:
-        The derivatives, shape (d, k, nq, m + 1).
-    """
-    found = np.empty((*z_by_T.shape, slopes.shape[2] + 1))
-    by_points = _over_powers(basis, 0, T).reshape(-1, len(slopes)) @ slopes.reshape(len(slopes), -1)
-    found[..., :-1] = by_points.reshape(*z_by_T.shape, slopes.shape[2])
-    found[..., -1] = z_by_T
-    return found
-
-
-def _products(gradients: Array, Z: Array, rows: Mask) -> Array:
-    """Derivatives of constraints by x, from those by q, v and a.
-
-    Args:
-        gradients: gradients of the constraints of `rows`, in their order, shape (r, d nq).
-        Z: derivatives of q, v and a at k instants by x, shape (d, k, nq, m + 1).
-        rows: mask (k, c) of constraints at the instants.
-
-    Returns:
-        The derivatives, shape (r, m + 1).
-    """
-    instant, _ = np.nonzero(rows)
-    orders, _, nq, count = Z.shape
-    by_x = Z[:, instant].swapaxes(0, 1).reshape(len(instant), orders * nq, count)
-    return np.asarray((gradients[:, None] @ by_x)[:, 0])
