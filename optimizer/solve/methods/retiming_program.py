@@ -109,18 +109,10 @@ class RetimingProgram:
         hessian[:-1, :-1] += retiming.curvature(at.x, by_points)
         hessian[:-1, -1] = hessian[-1, :-1] = mixed
         by_T = float((by_cost * z_by_T).sum())
-        bent = _ORDERS * (_ORDERS + 1)
-        hessian[-1, -1] = (
-            float((by_bends * z_by_T).sum())
-            + 2 * by_T / T
-            + (
-                float((by_nodes * bent * at.z).sum())
-                + float((by_path * bent[:2] * at.at_path).sum())
-                # limits on rates are proportional to T^d with d = 1 to 3
-                - float((np.abs(of_rates) * bent).sum())
-            )
-            / T**2
-        )
+        hessian[-1, -1] = float((by_bends * z_by_T).sum()) + 2 * by_T / T
+        hessian[-1, -1] += _bent(by_nodes, at.z, T) + _bent(by_path, at.at_path, T)
+        # limits on rates are proportional to T^d with d = 1 to 3
+        hessian[-1, -1] -= _bent(np.abs(of_rates), np.ones_like(of_rates), T)
         return RetimingDerivatives(
             gradient=np.append(
                 retiming.by_control_values(at.x, _by_points(self._at_nodes, by_cost, T)),
@@ -255,6 +247,11 @@ def _parts(by_y: Array) -> Array:
 def _weighted(multipliers: Array, gradients: Array) -> Array:
     """Σ_c multiplier · gradient, shape (k, n), for multipliers (k, c) and gradients (k, c, n)."""
     return np.asarray((multipliers[:, None] @ gradients)[:, 0])
+
+
+def _bent(by_z: Array, z: Array, T: float) -> float:
+    """Σ by_z · ∂²z/∂T², for derivatives z (d, k, nq) of a spline, proportional to T^-d."""
+    return float((by_z * (_ORDERS * (_ORDERS + 1))[: len(z)] * z).sum()) / T**2
 
 
 def _by_points(basis: Array, by_z: Array, T: float, first: int = 0) -> Array:
