@@ -53,7 +53,7 @@ class PathRetiming(RetimedPath):
         """Solve for the time scaling of least cost.
 
         Limits exceeded between the nodes are tightened. The variables where the solve ends are kept
-        in `found`, and their cost [J] in `cost`.
+        in `found`.
 
         Args:
             guess: variables to start from, shape (m + 1,); None for the quintic time scaling.
@@ -75,8 +75,7 @@ class PathRetiming(RetimedPath):
         for solves in range(1, PATH_RETIMING.repairs + 1):
             sqp = RetimingSqp(RetimingProgram(self, limits, bounds), x)
             sqp.solve()
-            self.found, self.cost = sqp.at.x, sqp.at.cost
-            x = self.found
+            self.found = x = sqp.at.x
             iterations += sqp.iterations
             if sqp.at.violation.max() > PATH_RETIMING.feasible:
                 return SolveResult(

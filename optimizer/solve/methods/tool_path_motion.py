@@ -11,7 +11,6 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
-from joulepath.optimizer.dynamics.plant import has_corners
 from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace
 from joulepath.optimizer.motion.spline import Spline, sampled
 from joulepath.optimizer.problem.problem import DURATIONS
@@ -44,10 +43,6 @@ class ToolPathMotionSettings:
     promising: float = 1.1
     """Multiple of the incumbent's cost above which a motion that does not keep to the path yet is
     not solved in finer spaces: there, it hardly becomes cheaper."""
-
-    promising_with_corners: float = 1.4
-    """The same for mechanical work and on an isolated bus, whose smoothed corners add up to a
-    quarter to the cost."""
 
     finer: tuple[float, ...] = (1.5, 3.0)
     """First factors of second solves."""
@@ -99,14 +94,14 @@ class ToolPathMotion(Method):
         results, law = list[SolveResult](), None
         for interval in self._intervals():
             results.append(self._solved_along(path, interval, law))
-            if results[-1].status is SolveStatus.PRUNED:
-                break
             spline = results[-1].spline
             law = None if spline is None else on_path(path, *sampled(spline))
-        if results[0].status is SolveStatus.PRUNED:
-            return with_effort(results[0], results)
-        if all(result.spline is None for result in results) and not self._holds_speed:
-            results += self._nearly_fastest(path)
+        if all(result.spline is None for result in results):
+            for result in results:
+                if result.status is SolveStatus.PRUNED:
+                    return with_effort(result, results)
+            if not self._holds_speed:
+                results += self._nearly_fastest(path)
         found = self._without_collision(
             min(results, key=lambda result: self.cost_of(result.spline))
         )
@@ -295,13 +290,6 @@ class ToolPathMotion(Method):
         may_be_slower = self.prepared.problem.objective == "mechanical" and self.t_min < self.t_max
         return [self.interval, longest] if may_be_slower else [self.interval]
 
-    def _is_costlier(self, interval: DurationInterval, cost: float) -> bool:
-        """Whether a cost [J] in an interval is far above the cost of the incumbent."""
-        with_corners = has_corners(self.prepared.problem.objective, self.prepared.arm)
-        settings = TOOL_PATH_MOTION
-        margin = settings.promising_with_corners if with_corners else settings.promising
-        return not interval.minimum_time and cost > above(self.incumbent_cost, margin)
-
     def _solved_along(
         self,
         path: Spline,
@@ -340,7 +328,10 @@ class ToolPathMotion(Method):
             results.append(found)
             if found.spline is not None or failures == TOOL_PATH_MOTION.failures:
                 break
-            if self._is_costlier(interval, retiming.cost):
+            coarse, margin = retiming.motion(retiming.found), TOOL_PATH_MOTION.promising
+            if not interval.minimum_time and (
+                self.cost_of(coarse) > above(self.incumbent_cost, margin)
+            ):
                 results.append(SolveResult(SolveStatus.PRUNED, SolveReason.PROMISES_NO_LESS))
                 break
             law = retiming.law(retiming.found)
