@@ -195,6 +195,14 @@ def test_its_duration_is_free_by_the_ramps_alone() -> None:
     assert "fixed path.speed" in refusal.value.candidates[0].reason
 
 
+def test_the_speed_is_held_beside_ramps_far_shorter_than_the_path() -> None:
+    """Ramps of 1 mm at either end of 0.3 m, well within the limits at this speed."""
+    task = replace(LINE, tool_path=ToolPath(fixed_speed=0.02, ramp=1e-3))
+    found = optimize(task)
+    assert found.certificate.valid
+    assert 0.298 / 0.02 < found.trajectory.spline.duration < 0.302 / 0.02
+
+
 def test_a_speed_beyond_the_joints_says_what_to_do() -> None:
     with pytest.raises(NoTrajectory) as refusal:
         optimize(replace(CORNER, tool_path=replace(path_of(CORNER), fixed_speed=0.6)))

@@ -45,14 +45,18 @@ class EvenSpeedSettings:
     spans: tuple[int, ...] = (48, 96, 192, 384)
     """Evenly spaced spans of a motion, tried in turn."""
 
-    ramp_spans: int = 8
+    ramp_spans: int = 12
     """Spans of a ramp."""
 
     fitted_per_span: int = 5
     """Instants per span at which the motion is fitted to the path."""
 
     least_span: float = 0.05
-    """Length, relative to an evenly spaced span, below which a span is merged."""
+    """Length, relative to the shortest of the evenly spaced spans and those of ramps, below which a
+    span is merged."""
+
+    growth: float = 2.0
+    """Ratio of successive spans beside a short ramp."""
 
     checked_per_span: int = 8
     """Instants per span at which the speed is checked."""
@@ -266,20 +270,38 @@ class EvenSpeed:
 
 
 def _breaks(spans: int, first: float, last: float) -> Array:
-    """Ends of spans (k,) in [0, 1]: evenly spaced, and within ramps.
+    """Ends of spans (k,) in [0, 1]: evenly spaced, and within and beside ramps.
 
     Args:
         spans: number of evenly spaced spans.
         first: share of the time of the first ramp.
         last: share of the time of the last ramp.
     """
-    ramp = np.linspace(0.0, 1.0, EVEN_SPEED.ramp_spans + 1)
     breaks = np.unique(
-        np.concatenate([np.linspace(0.0, 1.0, spans + 1), first * ramp, 1 - last * ramp])
+        np.concatenate(
+            [np.linspace(0.0, 1.0, spans + 1), _graded(first, spans), 1 - _graded(last, spans)]
+        )
     )
-    breaks = breaks[np.append(True, np.diff(breaks) > EVEN_SPEED.least_span / spans)]
+    shortest = min(1 / spans, first / EVEN_SPEED.ramp_spans, last / EVEN_SPEED.ramp_spans)
+    breaks = breaks[np.append(True, np.diff(breaks) > EVEN_SPEED.least_span * shortest)]
     breaks[-1] = 1.0
     return np.asarray(breaks)
+
+
+def _graded(ramp: float, spans: int) -> Array:
+    """Ends of spans (k,) from 0: of a ramp, and after it of spans that grow to evenly spaced ones.
+
+    A kink of the jerk at the end of a ramp disturbs the fit over the length of the span after it.
+
+    Args:
+        ramp: share of the time of the ramp.
+        spans: number of evenly spaced spans.
+    """
+    widths = [ramp / EVEN_SPEED.ramp_spans] * EVEN_SPEED.ramp_spans
+    while (width := EVEN_SPEED.growth * widths[-1]) < 1 / spans:
+        widths.append(width)
+    ends = np.cumsum([0.0, *widths])
+    return ends[ends < 1.0]
 
 
 def _ramped(t: Array, ramp: float, speed: float) -> Array:
