@@ -37,6 +37,10 @@ class ToolPathMotionSettings:
     refinements: tuple[float, ...] = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
     """Factors on the spans of the motion, tried until the motion keeps to the path."""
 
+    scaling_power: float = 0.5
+    """Exponent of these factors in the factors on the spans of the time scaling: a scaling as fine
+    as the motion has changes that the motion does not follow, and leaves the path."""
+
     failures: int = 2
     """Successive factors without a motion within the limits after which no finer one is tried."""
 
@@ -316,7 +320,8 @@ class ToolPathMotion(Method):
         results, failures, law = list[SolveResult](), 0, law or self._laws.paced(path)
         for factor in TOOL_PATH_MOTION.refinements:
             space = self._laws.space(path, law, factor * finer)
-            retiming = PathRetiming(self.prepared, path, interval, space, space)
+            scaling = self._laws.space(path, law, factor**TOOL_PATH_MOTION.scaling_power * finer)
+            retiming = PathRetiming(self.prepared, path, interval, space, scaling)
             t, s = law
             found = retiming.solve(retiming.variables(s, t), self._laws.keeps_to_path)
             if found.reason is SolveReason.NO_MOTION_ALONG_PATH:
