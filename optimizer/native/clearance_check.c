@@ -29,9 +29,10 @@ static int is_near(const Check *check, long k) {
   return !(pair_distance(shapes, check->frames, 0, pair, least, least, direction, normal, point) >= least);
 }
 
-/* Whether the open pairs are far enough apart at q (n) [rad]. Closes those whose distances stay beyond the reserve if
-   they change by no more than `changes`. */
-static int is_clear(const Check *check, const double *q, long *count) {
+/* Whether the open pairs are far enough apart at q (n) [rad]. In the `middle` of a line, closes those whose distances
+   stay beyond the reserve if they change by no more than `changes`; from elsewhere, the rest of the line may be longer
+   than the half for which `changes` hold. */
+static int is_clear(const Check *check, const double *q, int middle, long *count) {
   const Shapes *shapes = check->shapes;
   link_frames(1, shapes->frames - 1, check->placements, q, check->frames);
   for (long b = 0; b < shapes->bodies; ++b)
@@ -42,8 +43,9 @@ static int is_clear(const Check *check, const double *q, long *count) {
     const double *a = check->centre + 3 * check->ends[2 * k], *b = check->centre + 3 * check->ends[2 * k + 1];
     const double across[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
     const double squared = dot(across, across), near = check->reach[k], far = near + check->changes[check->lever_of[k]];
-    if (squared >= far * far) continue;
-    if (squared < near * near && is_near(check, k)) {
+    if (middle && squared >= far * far) continue;
+    /* NAN counts as near */
+    if (!(squared >= near * near) && is_near(check, k)) {
       *check->last = k;
       return 0;
     }
@@ -53,15 +55,16 @@ static int is_clear(const Check *check, const double *q, long *count) {
   return 1;
 }
 
-/* `is_clear` with the share `part` / `count` of the way from `q` to `q_end` (n); counts the configurations. */
+/* `is_clear` with the share `part` / `count` of the way from `q` to `q_end` (n); counts the configurations, of which
+   the first is the middle. */
 static int is_clear_at(const Check *check, const double *q, const double *q_end, long part, long count, long *open,
                        long *checked) {
   const long n = check->shapes->frames - 1;
   const double share = (double)part / (double)count;
   double at[n];
-  ++*checked;
+  const int middle = ++*checked == 1;
   for (long i = 0; i < n; ++i) at[i] = (1 - share) * q[i] + share * q_end[i];
-  return is_clear(check, at, open);
+  return is_clear(check, at, middle, open);
 }
 
 /* Whether the pairs are far enough apart at the configurations with the shares 1/count, 2/count ... 1 of the way from

@@ -188,6 +188,26 @@ def test_a_line_is_valid_if_all_its_states_are(seed: int) -> None:
     assert 10 < sum(ends) < len(ends) - 10
 
 
+def test_a_line_past_an_obstacle_near_its_beginning_is_invalid() -> None:
+    """The tool passes a small box early, and is far from it in the middle and at the end: only the
+    levers from the middle on bound how near the box it may have been.
+    """
+    box = Obstacle("box", Box(np.array([0.03, 0.047, 0.042])), at(-0.227, -0.925, 0.138), 0.005)
+    arm = Arm(robot=ROBOT, scene=Scene([box]))
+    checker = StateValidityChecker(arm, CollisionModel(arm), 0.0005)
+    q = np.array([1.005, 6.175, 0.302, 4.896, 3.232, -5.171])
+    q_end = q + np.array([1.109, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert checker.is_valid(q)
+    assert not checker.is_valid(q + 5 / 30 * (q_end - q))
+    assert not checker.is_valid_between(q, q_end, 30)[0]
+
+
+def test_a_configuration_without_numbers_is_invalid() -> None:
+    arm = arm_in_cell(LOADS[0], cell(0))
+    checker = StateValidityChecker(arm, CollisionModel(arm))
+    assert not checker.is_valid(np.full(arm.robot.nq, np.nan))
+
+
 @pytest.mark.parametrize("name", TASKS)
 def test_planned_paths_are_collision_free(name: str) -> None:
     arm, q_start, q_goal = task(name)
